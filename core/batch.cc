@@ -9,6 +9,7 @@
 #include "core/base/dense.h"
 #include "core/base/message.h"
 #include "core/base/name_point.h"
+#include "core/label_table.h"
 #include "core/wall_beyond.h"
 
 namespace stellate::core {
@@ -198,6 +199,13 @@ std::string NameTangential(WallSet walls, const Eigen::MatrixXd& along) {
   return Message("walls ", pair[0], " and ", pair[1], " at ", Brief(degrees), " degrees");
 }
 
+// Whether a point of a face is in M, and of arrangements the face is live there: elsewhere walls
+// may meet as they like.
+bool IsOnM(const Specification& spec, WallSet face, const double* clearances) {
+  if (spec.labels.empty()) return !WallBeyond(clearances, spec.walls, face);
+  return LabelTable(spec.labels).Piece(face, SignsOf(clearances, spec.walls)) != 0;
+}
+
 // Checks that conormals are unit, tangent to the tangent basis of the same answer, and independent
 // of each other. Where walls meet beyond others they need not be: M is not there.
 Status CheckConormals(const Specification& spec, const QueryBlock& block, Index query,
@@ -231,8 +239,7 @@ Status CheckConormals(const Specification& spec, const QueryBlock& block, Index 
                       "normal and project it onto that, or is the wall tangential here?");
     ++n;
   });
-  if (!status.ok() || count < 2 ||
-      WallBeyond(answer.clearances.col(j).data(), spec.walls, block.face))
+  if (!status.ok() || count < 2 || !IsOnM(spec, block.face, answer.clearances.col(j).data()))
     return status;
   const Eigen::MatrixXd gram = along.transpose() * along;
   const double independent = EigenvaluesOfSymmetric(gram)[0];

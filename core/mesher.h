@@ -56,6 +56,8 @@ class Mesher {
   // vertex ids each, in the order of their lowest vertex.
   virtual Eigen::MatrixXd Tangents() const = 0;
   virtual std::vector<std::uint32_t> Simplices() const = 0;
+  // Compute the labels of these simplices, in their order; empty without labels.
+  virtual std::vector<std::int8_t> Labels() const = 0;
 };
 
 }  // namespace stellate::core

@@ -52,6 +52,7 @@ struct MeshDelta {
   Eigen::MatrixXd points;                     // d x (new vertices)
   std::vector<std::uint32_t> added, removed;  // simplices, k+1 ascending vertex ids each
   std::vector<WallSet> walls;                 // of each new vertex; empty where none is on a wall
+  std::vector<std::int8_t> labels;            // of each added simplex; empty without labels
 };
 
 struct Counts {
@@ -72,12 +73,24 @@ struct FaceMesh {
   WallSet walls = 0;
   int dimension = 0;
   std::vector<std::uint32_t> simplices;
+  // Of a face of one wall: the labels on its negative and its positive side. Without labels, what
+  // is beyond a wall has the label 0, and M the label 1.
+  std::pair<int, int> sides = {0, 1};
 };
 
 // A face in the certificate.
 struct FaceReport {
   WallSet walls = 0;
   int dimension = 0;
+  std::uint64_t simplices = 0;
+  std::uint64_t components = 0;
+  std::int64_t euler_characteristic = 0;
+  std::pair<int, int> sides = {0, 1};  // as of FaceMesh
+};
+
+// A region of an arrangement of walls in the certificate: the part of M with one label.
+struct RegionReport {
+  int label = 0;
   std::uint64_t simplices = 0;
   std::uint64_t components = 0;
   std::int64_t euler_characteristic = 0;
@@ -158,7 +171,8 @@ struct Certificate {
   std::uint64_t boundary_simplices = 0;  // of dimension k - 1
   std::uint64_t boundary_components = 0;
   std::int64_t boundary_euler_characteristic = 0;
-  std::vector<FaceReport> faces;  // all faces, by dimension, the lowest first
+  std::vector<FaceReport> faces;      // all faces, by dimension, the lowest first
+  std::vector<RegionReport> regions;  // of an arrangement of walls, by label; else none
   // The smallest angle of walls at all vertices on several walls; none: no walls meet. Set for
   // every ending of a run.
   std::optional<WallAngle> sharpest;

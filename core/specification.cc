@@ -54,7 +54,30 @@ Status CheckDimensions(const Specification& spec) {
   return Status::Ok();
 }
 
+Status CheckLabels(const Specification& spec) {
+  if (spec.walls > kMaxLabelledWalls)
+    return TooLarge("labels", Message("labels are set for ", spec.walls, " walls but at most ",
+                                      kMaxLabelledWalls, " walls may have labels"));
+  if (spec.labels.size() != std::size_t{1} << spec.walls)
+    return Invalid("labels", Message("labels has ", spec.labels.size(), " entries where ",
+                                     spec.walls, " walls have ", std::size_t{1} << spec.walls,
+                                     " sign vectors: give one for each"));
+  const auto worst = std::min_element(spec.labels.begin(), spec.labels.end());
+  if (*worst < 0)
+    return Invalid("labels", Message("labels[", worst - spec.labels.begin(), "] is ", int{*worst},
+                                     " but must be 0, outside of the manifold, or more"));
+  if (std::all_of(spec.labels.begin(), spec.labels.end(), [](int label) { return label == 0; }))
+    return Invalid("labels", "labels are all 0: they leave nothing of the manifold");
+  if (spec.criteria.speculative)
+    return Invalid("criteria.speculative",
+                   "criteria.speculative is set together with labels: on a surrogate nothing is "
+                   "known of the walls' signs; leave one of them out");
+  return Status::Ok();
+}
+
 Status CheckWalls(const Specification& spec) {
+  if (spec.walls == 0 && !spec.labels.empty())
+    return Invalid("labels", "labels are set without walls, whose sign vectors they are of");
   if (spec.walls == 0) return Status::Ok();
   if (spec.walls < 0 || spec.walls > kMaxWalls) {
     return Invalid("walls", Message("walls is ", spec.walls, " but must be between 0 and ",
@@ -65,6 +88,8 @@ Status CheckWalls(const Specification& spec) {
                    "walls is set: the oracle must give tangent bases and, with points of faces, "
                    "conormals, whose coordinates are in these bases");
   }
+  if (!spec.labels.empty())
+    if (Status status = CheckLabels(spec); !status.ok()) return status;
   if (spec.declared_reach || spec.cover_box) {
     return Invalid("declared_reach",
                    "declared_reach is set together with walls, but only manifolds without boundary "

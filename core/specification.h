@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <optional>
+#include <vector>
 
 #include "core/status.h"
 #include "core/walls.h"
@@ -22,6 +23,7 @@ inline constexpr double kMaxSliverBound = 0.3;  // refinement does not terminate
 inline constexpr int kMaxCandidates = 100;
 inline constexpr int kMaxFlatAlternations = 20;
 inline constexpr int kMaxBoxSeeds = 100'000;
+inline constexpr int kMaxLabelledWalls = 16;
 inline constexpr int kMaxComponents = 1'000'000;                   // that may be declared
 inline constexpr std::int64_t kMaxBoxSeedCoordinates = 4'000'000;  // box_seeds times d
 
@@ -106,7 +108,11 @@ struct Specification {
   int dimension = 0;          // k
   int ambient_dimension = 0;  // d, k < d
   int walls = 0;              // of a manifold with boundary: see core/walls.h; k <= d then
-  double epsilon = 0;         // rule R1: every R_p(sigma) <= epsilon; a length, > 0
+  // An arrangement of walls: the label, 0 to 127, of each of the 2^walls sign vectors, in whose
+  // number bit i is set where g_i >= 0. M is where the label is not 0; its regions, one for each
+  // label, are meshed together. Empty: M is where all g_i >= 0.
+  std::vector<std::int8_t> labels;
+  double epsilon = 0;  // rule R1: every R_p(sigma) <= epsilon; a length, > 0
   OracleCapabilities oracle;
   std::optional<BoundingBox> bounding_box;  // seeds are drawn from it when none are given
   Eigen::MatrixXd seeds;                    // d x m, near M, may be empty

@@ -14,6 +14,7 @@ namespace stellate::core {
 using WallSet = std::uint64_t;
 
 inline constexpr int kMaxWalls = 64;
+inline constexpr int kNoWall = -1;
 
 inline constexpr WallSet SetOfWall(int wall) { return WallSet{1} << wall; }
 inline constexpr int CountWalls(WallSet walls) { return std::popcount(walls); }

@@ -69,8 +69,8 @@ bool HasSharpDihedral(const Stars<K>& stars, std::uint32_t p, const double* at,
 
 template <int K>
 std::optional<std::size_t> WorstSharp(const Stars<K>& stars, std::uint32_t p, double cosine,
-                                      double least_radius) {
-  const auto& cell = stars.cell(p);
+                                      double least_radius, int sector) {
+  const auto& cell = stars.cell(p, sector);
   const auto is_held = [&](std::size_t v) {
     for (int s = 0; s < K; ++s)
       if (const std::uint32_t id = cell.id(cell.facet(v, s)); id < p || !IsSample(id)) return false;
@@ -88,11 +88,12 @@ std::optional<std::size_t> WorstSharp(const Stars<K>& stars, std::uint32_t p, do
   return worst;
 }
 
-#define STELLATE_EACH(K)                                                                  \
-  template bool HasSharpDihedral<K>(const Stars<K>&, std::uint32_t, const double*,        \
-                                    const RestrictedVoronoiCell<K>&, std::size_t, double, \
-                                    const double*);                                       \
-  template std::optional<std::size_t> WorstSharp<K>(const Stars<K>&, std::uint32_t, double, double);
+#define STELLATE_EACH(K)                                                                    \
+  template bool HasSharpDihedral<K>(const Stars<K>&, std::uint32_t, const double*,          \
+                                    const RestrictedVoronoiCell<K>&, std::size_t, double,   \
+                                    const double*);                                         \
+  template std::optional<std::size_t> WorstSharp<K>(const Stars<K>&, std::uint32_t, double, \
+                                                    double, int);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH
 

@@ -22,6 +22,6 @@ bool HasSharpDihedral(const Stars<K>& stars, std::uint32_t p, const double* at,
 // is p and whose circumradius is larger than `least_radius`.
 template <int K>
 std::optional<std::size_t> WorstSharp(const Stars<K>& stars, std::uint32_t p, double cosine,
-                                      double least_radius);
+                                      double least_radius, int sector = 0);
 
 }  // namespace stellate::core

@@ -11,6 +11,33 @@
 
 namespace stellate::core {
 
+namespace {
+
+// Returns the cosine of the smallest angle between two walls of an arrangement at p, `first` and
+// `second`, over all sectors between live parts of them, also those outside of M: points of the two
+// walls cut each other there, too.
+template <int K>
+double CosineBetween(const Sample<K>& sample, std::uint32_t p, int first, int second,
+                     double inside) {
+  if (sample.sectors().labels().empty()) return inside;
+  const WallSet walls = sample.walls(p);
+  const WallSet pair = SetOfWall(first) | SetOfWall(second), rest = walls & ~pair;
+  double sharpest = -1;
+  for (WallSet part = rest;; part = (part - 1) & rest) {
+    for (const WallSet sides : {WallSet{0}, SetOfWall(first), SetOfWall(second), pair}) {
+      const WallSet signs = (sample.sectors().Signs(p) & ~walls) | part | sides;
+      // On equal sides of the two the angle is that of the half-spaces.
+      const double cosine = sides == 0 || sides == pair ? inside : -inside;
+      if (cosine > sharpest && sample.sectors().labels().Piece(SetOfWall(first), signs) != 0 &&
+          sample.sectors().labels().Piece(SetOfWall(second), signs) != 0)
+        sharpest = cosine;
+    }
+    if (part == 0) return sharpest;
+  }
+}
+
+}  // namespace
+
 template <int K>
 std::optional<WallCosine> SharpestAt(const Stars<K>& stars, std::uint32_t p) {
   const WallSet walls = stars.sample().walls(p);
@@ -28,7 +55,8 @@ std::optional<WallCosine> SharpestAt(const Stars<K>& stars, std::uint32_t p) {
     int b = a + 1;
     ForEachWall(walls & ~((SetOfWall(first) << 1) - 1), [&](int second) {
       // The angle between the half-spaces that the walls leave: 0 if their conormals are opposite.
-      const double cosine = -Dot(conormals + K * a, conormals + K * b, K);
+      const double cosine = CosineBetween<K>(stars.sample(), p, first, second,
+                                             -Dot(conormals + K * a, conormals + K * b, K));
       if ((!sharpest || cosine > sharpest->cosine) &&
           share_edge(SetOfWall(first) | SetOfWall(second)))
         sharpest = WallCosine{SetOfWall(first) | SetOfWall(second), cosine};

@@ -13,6 +13,7 @@
 #include "core/certificate/claims/coverage_claims.h"
 #include "core/certificate/claims/examination.h"
 #include "core/certificate/claims/reach_claims.h"
+#include "core/certificate/claims/region_claims.h"
 #include "core/certificate/claims/sheet_claims.h"
 #include "core/certificate/evidence/probes.h"
 #include "core/certificate/evidence/undeclared_boundary_check.h"
@@ -37,6 +38,7 @@ class Certifier::Impl {
     clear_ = std::move(known.clear);
     if (mesh.faces) boundary_.emplace(x_);
     if (const std::optional<StarGeometry> stars = JudgeComplex(x_)) {
+      if (mesh.labels) regions_.emplace(x_).Judge();
       claims_.emplace(x_, *stars, known.tangential_offsets);
       AskFirst();
     } else {
@@ -102,23 +104,31 @@ class Certifier::Impl {
   void AskWithin(Eigen::MatrixXd points, const Judge& judge, bool with_tangents = false) {
     if (!boundary_) return Ask(std::move(points), judge, with_tangents);
     const auto within = [this, judge](const Eigen::MatrixXd& asked, const AnswerBlock& answer) {
-      boundary_->JudgeBeyond(answer);
+      if (!regions_) boundary_->JudgeBeyond(answer);
       AnswerBlock inside = answer;
       const Eigen::Index count = answer.points.cols();
       inside.found.resize(static_cast<std::size_t>(count), 1);
       for (Eigen::Index j = 0; j < count; ++j)
-        if (answer.clearances.cols() == count && answer.clearances.col(j).minCoeff() < 0)
+        if (answer.clearances.cols() == count && !IsInside(answer.clearances.col(j)))
           inside.found[static_cast<std::size_t>(j)] = 0;
       judge(asked, inside);
     };
     Ask(std::move(points), within, with_tangents);
   }
 
+  bool IsInside(const Eigen::Ref<const Eigen::VectorXd>& clearances) const {
+    return x_.mesh.table ? x_.mesh.table->Of(SignsOf(clearances.data(), x_.spec.walls)) != 0
+                         : clearances.minCoeff() >= 0;
+  }
+
   void AskFirst() {
     Claims& c = *claims_;
     Ask(c.closeness.InsideQuestions(), [this](const Eigen::MatrixXd& asked, const AnswerBlock& a) {
       const ClosenessClaims& closeness = claims_->closeness;
-      if (boundary_) boundary_->JudgeInside(closeness.simplices(), closeness.points_inside(), a);
+      if (regions_)
+        regions_->JudgeInside(closeness.simplices(), closeness.points_inside(), a);
+      else if (boundary_)
+        boundary_->JudgeInside(closeness.simplices(), closeness.points_inside(), a);
       claims_->closeness.JudgeInside(asked, a);
     });
     vertices_ = blocks_.size();
@@ -162,7 +172,7 @@ class Certifier::Impl {
   // Notes clearances of the first round only: the answers to queries where clearances dip must not
   // cause further such queries.
   void Note(WallSet face, const AnswerBlock& answer) {
-    if (face != 0 && ball_steps_ > 0) return;
+    if ((face != 0 && ball_steps_ > 0) || regions_) return;
     for (Eigen::Index j = 0; j < answer.clearances.cols(); ++j) {
       CheckInterruption(static_cast<std::size_t>(j));
       if (Found(answer, j))
@@ -222,6 +232,7 @@ class Certifier::Impl {
   Examination x_;
   std::optional<Claims> claims_;            // if it is a complex
   std::optional<BoundaryClaims> boundary_;  // of a manifold with boundary
+  std::optional<RegionClaims> regions_;     // of an arrangement of walls, too
   EndsOfManifold ends_;                     // known before, and answered
   ClearPoints clear_;                       // the same
   std::optional<SheetClaims> sheets_;       // of a manifold with boundary, too

@@ -83,6 +83,20 @@ std::string DescribeBoundary(const Certificate& certificate) {
   return text + faces + ")";
 }
 
+// ", in 2 regions (label 1: 1 component of Euler characteristic 2; ...)"
+std::string DescribeRegions(const Certificate& certificate) {
+  if (certificate.regions.empty()) return {};
+  const auto counted = [](std::uint64_t n, const char* what) {
+    return Message(n, " ", what, n == 1 ? "" : "s");
+  };
+  std::string regions;
+  for (const RegionReport& region : certificate.regions)
+    regions += Message(regions.empty() ? "" : "; ", "label ", region.label, ": ",
+                       counted(region.components, "component"), " of Euler characteristic ",
+                       region.euler_characteristic);
+  return Message(", in ", counted(certificate.regions.size(), "region"), " (", regions, ")");
+}
+
 void Findings::Conclude(int k, const Specification& spec, Certificate& certificate) const {
   certificate.certified = clean();
   certificate.level = !clean()           ? CertificateLevel::kRefused
@@ -110,7 +124,7 @@ void Findings::Conclude(int k, const Specification& spec, Certificate& certifica
               certificate.orientable ? "orientable" : "non-orientable", " manifold of dimension ",
               k, " with ", components, components == 1 ? " component" : " components",
               " and Euler characteristic ", certificate.euler_characteristic,
-              has_walls ? DescribeBoundary(certificate) : "");
+              DescribeRegions(certificate), has_walls ? DescribeBoundary(certificate) : "");
   const char* const unseen =
       "Components of the manifold that no seed or sampled point fell on cannot be excluded";
   const char* const declared = components == static_cast<std::uint64_t>(spec.components)

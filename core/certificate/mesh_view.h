@@ -2,9 +2,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 #include "core/certificate/clear_points.h"
+#include "core/label_table.h"
 #include "core/report.h"
 
 namespace stellate::core {
@@ -23,12 +25,22 @@ struct MeshView {
   const WallSet* walls = nullptr;
   const double* outward = nullptr;
   const std::vector<FaceMesh>* faces = nullptr;
+  // For arrangements of walls, else null: the label of each simplex and of each sign vector; the
+  // walls' signs at each vertex; and whether it is on one side alone of all its walls.
+  const std::int8_t* labels = nullptr;
+  const LabelTable* table = nullptr;
+  const WallSet* signs = nullptr;
+  const std::uint8_t* one_sided = nullptr;
   // The squared radii of protecting balls, by vertex (Sample::SetProtectingBalls); null: none.
   const double* protecting_radii2 = nullptr;
 
   WallSet WallsOf(std::uint32_t v) const { return walls ? walls[v] : 0; }
   double ProtectingRadius2(std::uint32_t v) const {
     return protecting_radii2 ? protecting_radii2[v] : 0;
+  }
+  // Whether Outward points out of M: at a vertex with M on both sides of a wall it does not.
+  bool HasOutside(std::uint32_t v) const {
+    return WallsOf(v) != 0 && (!one_sided || one_sided[v] != 0);
   }
   const double* Outward(std::uint32_t v) const { return outward + std::size_t{v} * k; }
   const double* Point(std::uint32_t v) const { return points + std::size_t{v} * d; }
@@ -58,10 +70,13 @@ struct EndsOfManifold {
   std::vector<double> points;
   std::vector<int> walls;
   std::vector<double> conormals;
+  std::vector<std::pair<int, int>> sides;  // as of FaceMesh
 
-  void Add(const double* y, int wall, const double* conormal, int d) {
+  void Add(const double* y, int wall, const double* conormal, int d,
+           std::pair<int, int> of = {0, 1}) {
     points.insert(points.end(), y, y + d);
     walls.push_back(wall);
+    sides.push_back(of);
     conormals.insert(conormals.end(), conormal, conormal + d);
   }
 };

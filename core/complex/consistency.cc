@@ -33,8 +33,8 @@ Eigen::VectorXd CentreIn(const Stars<K>& stars, std::uint32_t q,
 // The sign of the simplex on p and the K points of the facets at vertex v of its cell, seen in
 // T_pM.
 template <int K>
-double Orientation(const Stars<K>& stars, std::uint32_t p, std::size_t v) {
-  const auto& cell = stars.cell(p);
+double Orientation(const Stars<K>& stars, std::uint32_t p, std::size_t v, int sector) {
+  const auto& cell = stars.cell(p, sector);
   if constexpr (K == 3) {  // by far the most often
     const double* const a = cell.normal(cell.facet(v, 0));
     const double* const b = cell.normal(cell.facet(v, 1));
@@ -43,7 +43,7 @@ double Orientation(const Stars<K>& stars, std::uint32_t p, std::size_t v) {
            a[2] * (b[0] * c[1] - b[1] * c[0]);
   }
   double m[K][K];
-  for (int r = 0; r < K; ++r) stars.HalfSpace(p, cell.facet(v, r), m[r]);
+  for (int r = 0; r < K; ++r) stars.HalfSpace(p, cell.facet(v, r), m[r], sector);
   double sign = 1;
   for (int c = 0; c < K; ++c) {
     int pivot = c;
@@ -113,17 +113,31 @@ std::optional<std::size_t> FindSimplex(const RestrictedVoronoiCell<K>& cell, std
   return std::nullopt;
 }
 
+template <int K>
+bool HasSimplex(const Stars<K>& stars, std::uint32_t q, std::uint64_t key, std::uint64_t piece) {
+  for (int sector = 0; sector < stars.sample().sectors().Count(q); ++sector) {
+    const auto& cell = stars.cell(q, sector);
+    const std::size_t v = cell.Find(key - Mix64(q));
+    if (v < cell.vertex_count() &&
+        stars.sample().sectors().Piece(q, sector, WallsAt<K>(cell, v)) == piece)
+      return true;
+  }
+  return false;
+}
+
 namespace {
 
 // IsConsistent for a star at the boundary, where the simplex may be one of a face.
 template <int K>
-bool IsConsistentOnFaces(const Stars<K>& stars, std::uint32_t p, std::size_t v) {
-  const auto simplex = stars.FaceSimplexOf(p, stars.cell(p), v);
+bool IsConsistentOnFaces(const Stars<K>& stars, std::uint32_t p, std::size_t v, int sector) {
+  const auto& cell = stars.cell(p, sector);
+  const auto simplex = stars.FaceSimplexOf(p, cell, v);
   if (simplex.fake || simplex.foreign) return false;
-  const std::uint64_t key = SimplexKey<K>(stars.cell(p), v, p);
+  const std::uint64_t key = SimplexKey<K>(cell, v, p);
+  const std::uint64_t piece = stars.sample().sectors().Piece(p, sector, simplex.walls);
   for (int i = 0; i < simplex.count; ++i) {
     const std::uint32_t q = simplex.ids[static_cast<std::size_t>(i)];
-    if (q != p && stars.cell(q).Find(key - Mix64(q)) == stars.cell(q).vertex_count()) return false;
+    if (q != p && !HasSimplex<K>(stars, q, key, piece)) return false;
   }
   return true;
 }
@@ -170,8 +184,9 @@ bool FindInStars(const Stars<K>& stars, std::uint32_t p, std::size_t v, std::uin
 }  // namespace
 
 template <int K>
-bool IsConsistent(const Stars<K>& stars, std::uint32_t p, std::size_t v) {
-  if (stars.sample().walls(p) != 0) return IsConsistentOnFaces<K>(stars, p, v);
+bool IsConsistent(const Stars<K>& stars, std::uint32_t p, std::size_t v, int sector) {
+  if (stars.sample().walls(p) != 0 || !stars.sample().sectors().labels().empty())
+    return IsConsistentOnFaces<K>(stars, p, v, sector);
   std::uint32_t others[K];
   std::size_t at[K];
   return FindInStars<K>(stars, p, v, others, at);
@@ -179,6 +194,7 @@ bool IsConsistent(const Stars<K>& stars, std::uint32_t p, std::size_t v) {
 
 template <int K>
 ConsistentSimplices<K>::ConsistentSimplices(const Stars<K>& stars) : known_(stars.size()) {
+  if (!stars.sample().sectors().labels().empty()) return;  // the stars' labels count, too
   ParallelFor(stars.size(), [&](std::uint32_t p) {
     if (stars.sample().walls(p) != 0) return;
     const auto& cell = stars.cell(p);
@@ -197,12 +213,13 @@ ConsistentSimplices<K>::ConsistentSimplices(const Stars<K>& stars) : known_(star
 // Neighbours lie on different sides of their common facet if their signs differ, with the one's
 // vertex off it in the place of the other's.
 template <int K>
-Folds<K>::Folds(const Stars<K>& stars, std::uint32_t p) : folded_(stars.cell(p).vertex_count()) {
-  const auto& cell = stars.cell(p);
+Folds<K>::Folds(const Stars<K>& stars, std::uint32_t p, int sector)
+    : folded_(stars.cell(p, sector).vertex_count()) {
+  const auto& cell = stars.cell(p, sector);
   thread_local std::vector<double> sides;
   sides.resize(folded_.size());
   for (std::size_t v = 0; v < sides.size(); ++v) {
-    sides[v] = Orientation<K>(stars, p, v);
+    sides[v] = Orientation<K>(stars, p, v, sector);
     folded_[v] = sides[v] == 0;
   }
   const auto is_wall = [&](std::size_t facet) { return IsWall(cell.id(facet)); };
@@ -223,8 +240,12 @@ Folds<K>::Folds(const Stars<K>& stars, std::uint32_t p) : folded_(stars.cell(p).
 template <int K>
 std::uint64_t CountInconsistent(const Stars<K>& stars, std::uint32_t p) {
   std::uint64_t count = 0;
-  for (std::size_t v = 0; v < stars.cell(p).vertex_count(); ++v)
-    count += !IsConsistent<K>(stars, p, v);
+  for (int sector = 0; sector < stars.sample().sectors().Count(p); ++sector) {
+    const auto& cell = stars.cell(p, sector);
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v)
+      count += stars.sample().sectors().Piece(p, sector, WallsAt<K>(cell, v)) != 0 &&
+               !IsConsistent<K>(stars, p, v, sector);
+  }
   return count;
 }
 
@@ -268,7 +289,8 @@ std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(const 
 #define STELLATE_EACH(K)                                                                        \
   template std::optional<std::size_t> FindSimplex<K>(                                           \
       const RestrictedVoronoiCell<K>&, std::uint32_t, const Stars<K>::Simplex&, std::uint64_t); \
-  template bool IsConsistent(const Stars<K>&, std::uint32_t, std::size_t);                      \
+  template bool IsConsistent(const Stars<K>&, std::uint32_t, std::size_t, int);                 \
+  template bool HasSimplex(const Stars<K>&, std::uint32_t, std::uint64_t, std::uint64_t);       \
   template std::uint64_t CountInconsistent(const Stars<K>&, std::uint32_t);                     \
   template std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(           \
       const Stars<K>&, std::uint32_t);

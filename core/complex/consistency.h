@@ -29,9 +29,14 @@ std::optional<std::size_t> FindSimplex(const RestrictedVoronoiCell<K>& cell, std
                                        std::uint64_t key);
 
 // Whether the simplex dual to vertex v of p's cell is in the stars of all its vertices. A simplex
-// of a face must not be foreign either.
+// of a face must not be foreign either. Of arrangements, it must have the same labels on all its
+// sides in all these stars.
 template <int K>
-bool IsConsistent(const Stars<K>& stars, std::uint32_t p, std::size_t v);
+bool IsConsistent(const Stars<K>& stars, std::uint32_t p, std::size_t v, int sector = 0);
+
+// Whether star(q) has a simplex of that key and that piece (Sample::Piece).
+template <int K>
+bool HasSimplex(const Stars<K>& stars, std::uint32_t q, std::uint64_t key, std::uint64_t piece);
 
 // Finds consistent simplices of all stars, with one search per simplex instead of one for each of
 // its stars. It does not find all: ask IsConsistent about the others, and about those at the
@@ -59,7 +64,7 @@ class ConsistentSimplices {
 template <int K>
 class Folds {
  public:
-  Folds(const Stars<K>& stars, std::uint32_t p);
+  Folds(const Stars<K>& stars, std::uint32_t p, int sector = 0);
 
   // Whether the simplex dual to vertex v of p's cell is folded over a neighbour.
   bool IsFolded(std::size_t v) const { return folded_[v] != 0; }

@@ -1,6 +1,7 @@
 #include "core/complex/sample.h"
 
 #include <cmath>
+#include <utility>
 
 #include "core/base/basis_layout.h"
 #include "core/base/capacity.h"
@@ -8,17 +9,19 @@
 namespace stellate::core {
 
 template <int K>
-Sample<K>::Sample(int d, double epsilon)
+Sample<K>::Sample(int d, double epsilon, LabelTable labels)
     : d_(d),
       epsilon_(epsilon),
       weight_scale_(1e-10 * epsilon * epsilon),
       points_(d),
+      sectors_(std::move(labels)),
       boundary_points_(d) {}
 
 template <int K>
 std::uint32_t Sample<K>::Add(const double* point, const double* tangent, WallSet walls,
-                             const double* conormals) {
+                             const double* conormals, WallSet signs) {
   const std::uint32_t id = size();
+  sectors_.Add(walls, signs);
   if (walls != 0) {
     walls_.resize(id, 0);
     walls_.push_back(walls);

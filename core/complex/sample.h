@@ -10,6 +10,7 @@
 #include "core/base/random.h"
 #include "core/base/vector_ops.h"
 #include "core/complex/centre_cache.h"
+#include "core/complex/sectors.h"
 #include "core/index/indexed_points.h"
 #include "core/walls.h"
 
@@ -24,6 +25,18 @@ struct Site {
   // K tangent coordinates for each of the walls, ascending: the outward unit normal of the wall in
   // T_pM.
   const double* conormals = nullptr;
+  // Of an arrangement of walls: the signs of all walls, those that the point is on aside.
+  WallSet signs = 0;
+  // The walls that the star at hand is on the negative side of (Sectors): their conormals point
+  // into it.
+  WallSet reversed = 0;
+
+  // Returns the same site for its star in a sector.
+  Site Towards(WallSet sector) const {
+    Site site = *this;
+    site.reversed = walls & ~sector;
+    return site;
+  }
 };
 
 // Working memory for q - p, on the stack where d is small.
@@ -54,12 +67,13 @@ class Sample {
  public:
   // d        ambient dimension
   // epsilon  the size bound, length: sets the scale of the perturbing weights
-  Sample(int d, double epsilon);
+  // labels   of an arrangement of walls
+  explicit Sample(int d, double epsilon, LabelTable labels = {});
 
-  // Adds a point, which searches find from now on, and returns its id. `walls`, `conormals`: as in
-  // Site.
+  // Adds a point, which searches find from now on, and returns its id. `walls`, `conormals`,
+  // `signs`: as in Site.
   std::uint32_t Add(const double* point, const double* tangent, WallSet walls = 0,
-                    const double* conormals = nullptr);
+                    const double* conormals = nullptr, WallSet signs = 0);
   // Adds a point inside all walls, which no search finds before Index(). `bound`: the size bound
   // there, length, if it is not epsilon for all; given for each point or for none.
   void AddUnindexed(const double* point, const double* tangent, double bound = 0);
@@ -92,7 +106,12 @@ class Sample {
   const double* Conormals(std::uint32_t id) const {
     return id < walls_.size() ? conormals_.data() + conormals_at_[id] : nullptr;
   }
-  Site At(std::uint32_t id) const { return {id, Point(id), Tangent(id), walls(id), Conormals(id)}; }
+  // `sector`: of the point's sectors; the site is of its star there.
+  Site At(std::uint32_t id, int sector = 0) const {
+    const Site site{id, Point(id), Tangent(id), walls(id), Conormals(id), sectors_.Signs(id)};
+    return sectors_.labels().empty() ? site : site.Towards(sectors_.SignsOf(id, sector));
+  }
+  const Sectors& sectors() const { return sectors_; }
 
   bool has_protecting_balls() const { return largest_protecting_radius2_ > 0; }
   double largest_protecting_radius2() const { return largest_protecting_radius2_; }
@@ -167,6 +186,7 @@ class Sample {
   std::vector<WallSet> walls_;
   std::vector<std::uint32_t> conormals_at_;
   std::vector<double> conormals_;
+  Sectors sectors_;
   std::vector<double> protecting_radii2_;  // squared radii, by point, up to the last; or empty
   double largest_protecting_radius2_ = 0;
   std::vector<double> bounds_;  // size bounds, by point, until ForgetBounds(); or empty

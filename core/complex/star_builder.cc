@@ -157,12 +157,11 @@ void StarBuilder<K>::Reset(const Site& p, Cell* star) const {
   star->Reset(options_.inradius, around);
   if (p.walls == 0) return;
   Step step(sample_.d());
-  const double* conormal = p.conormals;
   ForEachWall(p.walls, [&](int wall) {
-    around.Lift(conormal, step.data());
-    star->Clip(IdOfWall(wall), conormal, kWallOffset * options_.inradius, ThreadScratch(), around,
-               step.data());
-    conormal += K;
+    double outward[K];
+    const double offset = around.HalfSpace(IdOfWall(wall), outward);
+    around.Lift(outward, step.data());
+    star->Clip(IdOfWall(wall), outward, offset, ThreadScratch(), around, step.data());
   });
 }
 

@@ -39,7 +39,8 @@ class StarSurroundings final : public Surroundings<K> {
       return FakeHalfSpace<K>(static_cast<int>(id - kFirstFakeId), builder_.options().inradius,
                               normal);
     if (IsWall(id)) {
-      std::copy_n(ConormalOf(p_, WallOf(id)), K, normal);
+      const double sign = IsSubset(SetOfWall(WallOf(id)), p_.reversed) ? -1 : 1;
+      for (int a = 0; a < K; ++a) normal[a] = sign * ConormalOf(p_, WallOf(id))[a];
       return kWallOffset * builder_.options().inradius;
     }
     Step step(sample_.d());

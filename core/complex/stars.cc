@@ -48,13 +48,13 @@ void AppendTo(std::vector<std::uint32_t>* ids, const std::array<std::uint32_t, N
 
 }  // namespace
 
-// Calls visit(v, simplex) once for each simplex of star(p) whose lowest vertex is p: at common
-// centres a cell that is far from convex may hold one at two vertices.
+// Calls visit(v, simplex) once for each simplex of a sector of star(p) whose lowest vertex is p: at
+// common centres a cell that is far from convex may hold one at two vertices.
 template <int K>
 template <typename Visit>
-void Stars<K>::ForEachOwned(std::uint32_t p, const Visit& visit) const {
+void Stars<K>::ForEachOwned(std::uint32_t p, int sector, const Visit& visit) const {
   if (options_.boundary_only) return;
-  const Cell& cell = cells_[p];
+  const Cell& cell = this->cell(p, sector);
   if constexpr (K == 2) {
     if (centre_rule() == CentreRule::kTangentSpace) return ForEachOwnedTriangle(p, cell, visit);
   }
@@ -78,20 +78,45 @@ std::vector<std::uint32_t> Stars<K>::Simplices() const {
   return ParallelGather<std::uint32_t>(cells_.size(), [&](std::size_t p, auto* all) {
     thread_local std::vector<Simplex> owned;
     owned.clear();
-    ForEachOwned(static_cast<std::uint32_t>(p),
-                 [&](std::size_t, const Simplex& s) { owned.push_back(s); });
+    for (int sector = 0; sector < sample_.sectors().Count(static_cast<std::uint32_t>(p)); ++sector)
+      ForEachOwned(static_cast<std::uint32_t>(p), sector,
+                   [&](std::size_t, const Simplex& s) { owned.push_back(s); });
     std::sort(owned.begin(), owned.end());
     for (const Simplex& s : owned) AppendTo(all, s);
   });
 }
 
 template <int K>
-double Stars<K>::HalfSpace(std::uint32_t p, std::size_t facet, double* normal) const {
+std::vector<std::int8_t> Stars<K>::LabelsOf(const std::vector<std::uint32_t>& simplices) const {
+  std::vector<std::int8_t> labels;
+  if (sample_.sectors().labels().empty()) return labels;
+  labels.resize(simplices.size() / (K + 1));
+  ParallelFor(labels.size(), [&](std::size_t i) {
+    const std::uint32_t* const ids = simplices.data() + i * (K + 1);
+    const std::uint32_t p = ids[0];
+    Simplex simplex;
+    const auto holds = [&](int sector) {
+      const Cell& cell = this->cell(p, sector);
+      for (std::size_t v = 0; v < cell.vertex_count(); ++v)
+        if (SimplexOf(p, cell, v, &simplex) && std::equal(simplex.begin(), simplex.end(), ids))
+          return true;
+      return false;
+    };
+    int sector = sample_.sectors().Count(p) - 1;
+    while (sector > 0 && !holds(sector)) --sector;
+    labels[i] = static_cast<std::int8_t>(sample_.sectors().Label(p, sector));
+  });
+  return labels;
+}
+
+template <int K>
+double Stars<K>::HalfSpace(std::uint32_t p, std::size_t facet, double* normal, int sector) const {
+  const Cell& cell = this->cell(p, sector);
   if constexpr (K == 2) {
-    return builder().HalfSpace(sample_.At(p), cells_[p].id(facet), normal);
+    return builder().HalfSpace(sample_.At(p, sector), cell.id(facet), normal);
   } else {
-    std::copy_n(cells_[p].normal(facet), K, normal);
-    return cells_[p].offset(facet);
+    std::copy_n(cell.normal(facet), K, normal);
+    return cell.offset(facet);
   }
 }
 
@@ -106,12 +131,12 @@ double Stars<K>::EdgeLength2(std::uint32_t p, std::size_t facet) const {
 }
 
 template <int K>
-bool Stars<K>::CutsVertex(std::uint32_t p, std::size_t vertex, const double* point) const {
+bool Stars<K>::CutsVertex(const CellVertex& at, const double* point) const {
   Step step(sample_.d());
   double normal[K];
-  const double offset = 0.5 * (sample_.Project(sample_.At(p), point, step.data(), normal) +
-                               sample_.ProtectingRadius2(p));
-  return cells_[p].WouldCutVertex(vertex, normal, offset, step.data());
+  const double offset = 0.5 * (sample_.Project(sample_.At(at.star), point, step.data(), normal) +
+                               sample_.ProtectingRadius2(at.star));
+  return cell(at.star, at.sector).WouldCutVertex(at.vertex, normal, offset, step.data());
 }
 
 template <int K>
@@ -150,28 +175,55 @@ std::optional<typename Stars<K>::CellVertex> Stars<K>::EncroachedBy(const double
   sample_.boundary_tree().ForEachInfluencing(point, [&](std::uint32_t i) {
     const std::uint32_t p = boundary[i];
     if (IsSubset(sample_.walls(p), walls)) return;
-    const Cell& cell = cells_[p];
     double normal[K];
     const double offset = 0.5 * (sample_.Project(sample_.At(p), point, step.data(), normal) +
                                  sample_.ProtectingRadius2(p));
-    for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
-      // Few vertices are cut, so that this is checked first.
-      if (!cell.WouldCutVertex(v, normal, offset, step.data())) continue;
-      const WallSet at = WallsAt<K>(cell, v);
-      const int dimension = K - CountWalls(at);
-      if (IsSubset(at, walls) || dimension == 0 || dimension > lowest || cell.HasFakeFacet(v))
-        continue;
-      const double norm2 = cell.norm2(v);
-      const bool is_first = !worst && dimension < own;
-      const bool is_worse = worst && (dimension < lowest || norm2 > farthest2 ||
-                                      (norm2 == farthest2 && p < worst->star));
-      if (!is_first && !is_worse) continue;
-      worst = CellVertex{p, v};
-      lowest = dimension;
-      farthest2 = norm2;
+    for (int sector = 0; sector < sample_.sectors().Count(p); ++sector) {
+      const Cell& cell = this->cell(p, sector);
+      for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+        // Few vertices are cut, so that this is checked first.
+        if (!cell.WouldCutVertex(v, normal, offset, step.data())) continue;
+        const WallSet at = WallsAt<K>(cell, v);
+        const int dimension = K - CountWalls(at);
+        if (IsSubset(at, walls) || dimension == 0 || dimension > lowest || cell.HasFakeFacet(v) ||
+            sample_.sectors().Piece(p, sector, at) == 0)
+          continue;
+        const double norm2 = cell.norm2(v);
+        const bool is_first = !worst && dimension < own;
+        const bool is_worse = worst && (dimension < lowest || norm2 > farthest2 ||
+                                        (norm2 == farthest2 && p < worst->star));
+        if (!is_first && !is_worse) continue;
+        worst = CellVertex{p, v, sector};
+        lowest = dimension;
+        farthest2 = norm2;
+      }
     }
   });
   return worst;
+}
+
+// Gives a point that was just added its places for the cells of its sectors but the first.
+template <int K>
+void Stars<K>::NoteSectors(std::uint32_t id) {
+  const int sectors = sample_.sectors().Count(id);
+  if (sectors < 2) return;
+  more_at_.resize(id, 0);
+  more_at_.push_back(more_count_);
+  more_count_ += static_cast<std::size_t>(sectors) - 1;
+}
+
+template <int K>
+typename Stars<K>::Cell& Stars<K>::MutableCell(std::uint32_t id, int sector) {
+  return sector == 0 ? cells_[id]
+                     : more_cells_[more_at_[id] + static_cast<std::size_t>(sector) - 1];
+}
+
+template <int K>
+bool Stars<K>::IsCutBy(const StarBuilder<K>& builder, std::uint32_t p, const Site& q) const {
+  const Site site = sample_.At(p);
+  for (int sector = 0; sector < sample_.sectors().Count(p); ++sector)
+    if (builder.IsCutBy(cell(p, sector), site, q)) return true;
+  return false;
 }
 
 // Appends the sample points that most likely close a cell around q, the nearest first: the nearest
@@ -211,24 +263,33 @@ void Stars<K>::FindClosing(const double* q, std::uint32_t near,
 
 template <int K>
 void Stars<K>::TryPoint(const double* point, const double* tangent, std::uint32_t near,
-                        Tentative* result, WallSet walls, const double* conormals) const {
+                        Tentative* result, WallSet walls, const double* conormals,
+                        WallSet signs) const {
   thread_local std::vector<std::uint32_t> closing, influenced;
-  const Site guest{size(), point, tangent, walls, conormals};
+  const Site guest{size(), point, tangent, walls, conormals, signs};
   const StarBuilder<K> builder = this->builder();
   FindClosing(point, near, &closing);
-  builder.Build(guest, closing, &result->own, &influenced);
+  const std::vector<WallSet> sectors = sample_.sectors().Of(walls, signs);
+  result->own.resize(sectors.size());
+  for (std::size_t i = 0; i < sectors.size(); ++i)
+    builder.Build(guest.Towards(sectors[i]), closing, &result->own[i], &influenced);
   result->cut.clear();
   for (const std::uint32_t p : influenced)
-    if (builder.IsCutBy(cells_[p], sample_.At(p), guest)) result->cut.emplace_back(p, cells_[p]);
-  for (auto& [p, cell] : result->cut) builder.Clip(sample_.At(p), guest, &result->own, &cell);
-  std::sort(result->cut.begin(), result->cut.end(),
-            [](const auto& a, const auto& b) { return a.first < b.first; });
+    for (int sector = 0; sector < sample_.sectors().Count(p); ++sector)
+      if (builder.IsCutBy(cell(p, sector), sample_.At(p), guest))
+        result->cut.push_back({p, sector, cell(p, sector)});
+  for (auto& [p, sector, cell] : result->cut)
+    builder.Clip(sample_.At(p, sector), guest, &result->own.front(), &cell);
+  std::sort(result->cut.begin(), result->cut.end(), [](const auto& a, const auto& b) {
+    return a.star != b.star ? a.star < b.star : a.sector < b.sector;
+  });
 }
 
 // Also finds the old stars that each new point cuts, by star, with their influence before the cuts.
 template <int K>
 std::vector<StarCut> Stars<K>::BuildNewStars(std::uint32_t first) {
   cells_.resize(size());
+  more_cells_.resize(more_count_);
   const StarBuilder<K> builder = this->builder();
   std::vector<StarCut> cuts =
       ParallelGather<StarCut>(near_.size(), [&](std::size_t i, auto* found) {
@@ -236,10 +297,12 @@ std::vector<StarCut> Stars<K>::BuildNewStars(std::uint32_t first) {
         thread_local Cell cell;  // its memory is used again; what is kept is as small as can be
         const Site q = sample_.At(first + static_cast<std::uint32_t>(i));
         FindClosing(q.point, near_[i], &closing);
-        builder.Build(q, closing, &cell, &influenced);
+        for (int sector = 0; sector < sample_.sectors().Count(q.id); ++sector) {
+          builder.Build(sample_.At(q.id, sector), closing, &cell, &influenced);
+          MutableCell(q.id, sector) = cell;
+        }
         for (const std::uint32_t p : influenced)
-          if (builder.IsCutBy(cells_[p], sample_.At(p), q)) found->push_back({p, q.id});
-        cells_[q.id] = cell;
+          if (IsCutBy(builder, p, q)) found->push_back({p, q.id});
       });
   near_.clear();
   ParallelSort(cuts, std::less<>());
@@ -282,29 +345,35 @@ void Stars<K>::CutStars(const std::vector<Turn>& turns, const std::vector<StarCu
     };
     for (std::size_t i = begin; i < end && !IsInterrupted(); ++i) {
       const std::uint32_t p = turns[i].star;
-      Cell& cell = cells_[p];
-      before.clear();
-      ForEachOwned(p, [&](std::size_t v, const Simplex& s) {
-        before.push_back({key_of(cell, v), s});
-      });
-      builder.Cut(sample_.At(p),
-                  std::span(cuts).subspan(turns[i].begin, turns[i].end - turns[i].begin), cells_,
-                  &cell);
-      for (const auto& [key, s] : before)
-        if (!is_left(cell, key, s)) AppendTo(&removed[chunk], s);
-      ForEachOwned(p, [&](std::size_t, const Simplex& s) {
-        if (s.back() >= first) AppendTo(&added[chunk], s);
-      });
-      influence[i] = builder.Influence(p, cell);
+      for (int sector = 0; sector < sample_.sectors().Count(p); ++sector) {
+        Cell& cell = MutableCell(p, sector);
+        before.clear();
+        ForEachOwned(p, sector, [&](std::size_t v, const Simplex& s) {
+          before.push_back({key_of(cell, v), s});
+        });
+        builder.Cut(sample_.At(p, sector),
+                    std::span(cuts).subspan(turns[i].begin, turns[i].end - turns[i].begin), cells_,
+                    &cell);
+        for (const auto& [key, s] : before)
+          if (!is_left(cell, key, s)) AppendTo(&removed[chunk], s);
+        ForEachOwned(p, sector, [&](std::size_t, const Simplex& s) {
+          if (s.back() >= first) AppendTo(&added[chunk], s);
+        });
+        influence[i] = std::max(influence[i], builder.Influence(p, cell));
+      }
     }
   });
   // A new point has the largest id of its simplices, except of those among new points alone.
   ParallelChunks(count, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t p = first + static_cast<std::uint32_t>(i);
-      ForEachOwned(
-          p, [&](std::size_t, const Simplex& s) { AppendTo(&added[removed.size() + chunk], s); });
-      influence[turns.size() + i] = builder.Influence(p, cells_[p]);
+      for (int sector = 0; sector < sample_.sectors().Count(p); ++sector) {
+        ForEachOwned(p, sector, [&](std::size_t, const Simplex& s) {
+          AppendTo(&added[removed.size() + chunk], s);
+        });
+        double& reach = influence[turns.size() + i];
+        reach = std::max(reach, builder.Influence(p, cell(p, sector)));
+      }
     }
   });
   SetInfluences(turns, first, influence);
@@ -349,11 +418,13 @@ void Stars<K>::MeasureFaces(const std::vector<Turn>& turns, std::uint32_t first)
   std::vector<double> influence(changed.size());
   ParallelFor(changed.size(), [&](std::size_t i) {
     const std::uint32_t p = boundary[changed[i]];
-    const Cell& cell = cells_[p];
     double most2 = 0;
-    for (std::size_t v = 0; v < cell.vertex_count(); ++v)
-      if (cell.norm2(v) > most2 && WallsAt<K>(cell, v) != 0 && !cell.HasFakeFacet(v))
-        most2 = cell.norm2(v);
+    for (int sector = 0; sector < sample_.sectors().Count(p); ++sector) {
+      const Cell& cell = this->cell(p, sector);
+      for (std::size_t v = 0; v < cell.vertex_count(); ++v)
+        if (cell.norm2(v) > most2 && WallsAt<K>(cell, v) != 0 && !cell.HasFakeFacet(v))
+          most2 = cell.norm2(v);
+    }
     influence[i] = builder.Influence(p, most2);
   });
   BallTree& tree = sample_.boundary_tree();
@@ -385,9 +456,11 @@ typename Stars<K>::Change Stars<K>::Insert(std::uint32_t first,
   const auto note_neighbours = [&](std::size_t count, const auto& star) {
     const auto found =
         ParallelGather<std::uint32_t>(count, [&](std::size_t i, std::vector<std::uint32_t>* ids) {
-          const Cell& cell = cells_[star(i)];
-          for (std::size_t f = 0; f < cell.facet_count(); ++f)
-            if (IsSample(cell.id(f))) ids->push_back(cell.id(f));
+          for (int sector = 0; sector < sample_.sectors().Count(star(i)); ++sector) {
+            const Cell& cell = this->cell(star(i), sector);
+            for (std::size_t f = 0; f < cell.facet_count(); ++f)
+              if (IsSample(cell.id(f))) ids->push_back(cell.id(f));
+          }
         });
     around->insert(around->end(), found.begin(), found.end());
   };
@@ -434,7 +507,7 @@ typename Stars<K>::Change Stars<K>::BuildAllInBulk() {
   MeasureFaces({}, 0);
   sample_.ForgetBounds();
   change.added = ParallelGather<std::uint32_t>(size(), [&](std::size_t p, auto* ids) {
-    ForEachOwned(static_cast<std::uint32_t>(p),
+    ForEachOwned(static_cast<std::uint32_t>(p), 0,
                  [&](std::size_t, const Simplex& s) { AppendTo(ids, s); });
   });
   simplex_count_ = change.added.size() / (K + 1);

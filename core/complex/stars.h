@@ -36,20 +36,23 @@ class Stars {
 
   // d        ambient dimension
   // epsilon  the size bound, length: sets the scale of the perturbing weights
-  Stars(int d, double epsilon, const StarOptions& options)
-      : options_(options), sample_(d, epsilon) {}
+  // labels   of an arrangement of walls: a point on walls then has a cell for each of its sectors
+  Stars(int d, double epsilon, const StarOptions& options, LabelTable labels = {})
+      : options_(options), sample_(d, epsilon, std::move(labels)) {}
 
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
   // Adds a point, whose star the next Commit builds, and returns its id; searches of the sample
-  // find it immediately. `walls`, `conormals`: as in Site. `near`: a sample point whose star the
-  // new one will change, if one is known, which makes building faster. The star in the tangent
-  // space is the same; at common centres the order of the cuts may matter in a cell that is far
-  // from convex.
+  // find it immediately. `walls`, `conormals`, `signs`: as in Site. `near`: a sample point whose
+  // star the new one will change, if one is known, which makes building faster. The star in the
+  // tangent space is the same; at common centres the order of the cuts may matter in a cell that is
+  // far from convex.
   std::uint32_t Add(const double* point, const double* tangent, std::uint32_t near = kNone,
-                    WallSet walls = 0, const double* conormals = nullptr) {
+                    WallSet walls = 0, const double* conormals = nullptr, WallSet signs = 0) {
     near_.push_back(near);
-    return sample_.Add(point, tangent, walls, conormals);
+    const std::uint32_t id = sample_.Add(point, tangent, walls, conormals, signs);
+    if (!sample_.sectors().labels().empty()) NoteSectors(id);
+    return id;
   }
   // Adds a point inside all walls that no search finds before Commit. The next Commit rebuilds all
   // stars together (BulkStarBuilder): cheaper if most of a sample is added in this way. `bound`: as
@@ -84,9 +87,16 @@ class Stars {
   const Sample<K>& sample() const { return sample_; }
   std::uint32_t size() const { return sample_.size(); }
   CentreRule centre_rule() const { return options_.centre_rule; }
-  const Cell& cell(std::uint32_t id) const { return cells_[id]; }
+  // `sector`: of the point's sectors.
+  const Cell& cell(std::uint32_t id, int sector = 0) const {
+    return sector == 0 ? cells_[id]
+                       : more_cells_[more_at_[id] + static_cast<std::size_t>(sector) - 1];
+  }
   // Simplices in the star of their lowest vertex: K+1 ids each, and how many there are.
   std::vector<std::uint32_t> Simplices() const;
+  // Returns the labels of simplices, K+1 ascending ids each, in the stars of their lowest vertices;
+  // empty without labels.
+  std::vector<std::int8_t> LabelsOf(const std::vector<std::uint32_t>& simplices) const;
   std::uint64_t simplex_count() const { return simplex_count_; }
 
   // Writes the k-simplex dual to vertex v of p's cell. Returns false if a facet of it is fake or a
@@ -128,7 +138,7 @@ class Stars {
   }
 
   // Writes the normal of a facet's half-space in p's cell, T_p^t (q - p), and returns its offset.
-  double HalfSpace(std::uint32_t p, std::size_t facet, double* normal) const;
+  double HalfSpace(std::uint32_t p, std::size_t facet, double* normal, int sector = 0) const;
   // Returns |q - p|^2 for the sample point q of a facet of p's cell, without the weights' share.
   double EdgeLength2(std::uint32_t p, std::size_t facet) const;
 
@@ -136,23 +146,29 @@ class Stars {
   struct CellVertex {
     std::uint32_t star;
     std::size_t vertex;
+    int sector = 0;
   };
   // Returns the vertex dual to a simplex of a face of lower dimension that a point on the face of
   // `walls` encroaches on, which its insertion would cut off: the one of the lowest dimension, and
   // among these the farthest out. Nothing if the point encroaches on no face.
   std::optional<CellVertex> EncroachedBy(const double* point, WallSet walls) const;
   // Whether inserting a point would remove the simplex dual to a vertex of p's cell from star(p).
-  bool CutsVertex(std::uint32_t p, std::size_t vertex, const double* point) const;
+  bool CutsVertex(const CellVertex& at, const double* point) const;
 
-  // The cells as they would be with one more point: its own, and those that it would cut, ascending
-  // by id.
+  // The cells as they would be with one more point: its own, by sector, and those that it would
+  // cut, ascending by star and sector.
   struct Tentative {
-    Cell own;
-    std::vector<std::pair<std::uint32_t, Cell>> cut;
+    struct Cut {
+      std::uint32_t star;
+      int sector;
+      Cell cell;
+    };
+    std::vector<Cell> own;
+    std::vector<Cut> cut;
   };
   // Writes these cells; the stars do not change. Other arguments: as for Add.
   void TryPoint(const double* point, const double* tangent, std::uint32_t near, Tentative* result,
-                WallSet walls = 0, const double* conormals = nullptr) const;
+                WallSet walls = 0, const double* conormals = nullptr, WallSet signs = 0) const;
 
  private:
   // The cuts of one star. Stars are cut in the order of the first new points that cut them.
@@ -177,15 +193,23 @@ class Stars {
   void SetInfluences(const std::vector<Turn>& turns, std::uint32_t first,
                      const std::vector<double>& influence);
   void MeasureFaces(const std::vector<Turn>& turns, std::uint32_t first);
+  void NoteSectors(std::uint32_t id);
+  Cell& MutableCell(std::uint32_t id, int sector);
+  bool IsCutBy(const StarBuilder<K>& builder, std::uint32_t p, const Site& q) const;
   void FindClosing(const double* q, std::uint32_t near, std::vector<std::uint32_t>* ids) const;
   template <typename Visit>
-  void ForEachOwned(std::uint32_t p, const Visit& visit) const;
+  void ForEachOwned(std::uint32_t p, int sector, const Visit& visit) const;
 
   StarOptions options_;
   bool includes_interior_next_ = false;
   Sample<K> sample_;
   std::vector<std::uint32_t> near_;  // of the points that wait for Commit
-  Blocks<Cell> cells_;
+  Blocks<Cell> cells_;               // of each point's first sector
+  // Of arrangements: the cells of the other sectors, and where those of each point up to the last
+  // that has any begin.
+  Blocks<Cell> more_cells_;
+  std::vector<std::size_t> more_at_;
+  std::size_t more_count_ = 0;
   std::uint64_t simplex_count_ = 0;
 };
 

@@ -29,13 +29,15 @@ bool BoundaryState<K>::KeepCrowd(const AnsweredPoints& answers, Eigen::Index c, 
       crowd.possible |= wall;
     if (answers.clearances(i, c) < 0) crowd.beyond |= wall;
   }
-  if (crowd.possible == 0 || !IsSubset(crowd.beyond, crowd.possible)) return false;
+  if (crowd.possible == 0) return false;
+  if (answers.labels.empty() && !IsSubset(crowd.beyond, crowd.possible)) return false;
   crowd.point = answers.points.col(c);
   for (const Eigen::VectorXd& other : crowded_)
     if ((other - crowd.point).norm() <= same) return true;
   crowd.tangent = answers.tangents.col(c);
   crowd.conormals = answers.conormals.col(c);
   if (answers.sizes.size() > 0) crowd.size = answers.sizes[c];
+  crowd.signs = answers.SignsOf(c);
   crowded_.push_back(crowd.point);
   crowds_.push_back(std::move(crowd));
   return true;

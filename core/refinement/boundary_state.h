@@ -49,7 +49,7 @@ class BoundaryState {
 
   // Records a point of the face of `walls` that lies beyond another wall: the face of both is near.
   void Discover(Eigen::VectorXd point, WallSet walls, int beyond) {
-    if (CountWalls(walls) < K)
+    if (beyond != kNoWall && CountWalls(walls) < K)
       discoveries_.push_back({std::move(point), walls | SetOfWall(beyond), {}});
   }
   bool has_discoveries() const { return !discoveries_.empty(); }
@@ -61,6 +61,7 @@ class BoundaryState {
     Eigen::VectorXd point, tangent, conormals;  // as of AnsweredPoints
     double size = 0;                            // as given, if sizes are
     WallSet walls = 0, possible = 0, beyond = 0;
+    WallSet signs = 0;  // of the other walls
   };
   // Learns the scale of the walls' values; a value far below the largest may be zero.
   void NoteClearances(const AnsweredPoints& answers, Eigen::Index c);
@@ -85,6 +86,7 @@ class BoundaryState {
     std::uint32_t star;
     std::uint64_t key;
     Rule by;
+    int sector;
   };
   void NoteEncroached(const Split& split) { splits_.push_back(split); }
   std::vector<Split> TakeSplits() { return std::exchange(splits_, {}); }

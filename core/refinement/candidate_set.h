@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/label_table.h"
 #include "core/refinement/criteria.h"
 #include "core/refinement/target.h"
 #include "core/refinement/violation_index.h"
@@ -51,12 +52,37 @@ struct AnsweredPoints {
   Eigen::MatrixXd conormals;   // (K numbers for each wall of the face, ascending) x n, in the
                                // points' own tangent coordinates
 
+  // Of arrangements, else empty: the labels, and the signs of all walls at each point (n).
+  LabelTable labels;
+  std::vector<WallSet> signs;
+
+  WallSet SignsOf(Eigen::Index c) const {
+    return signs.empty() ? 0 : signs[static_cast<std::size_t>(c)];
+  }
   // The wall that answer c violates most, or nothing if the point is in M. Walls that the point
-  // lies on do not count.
+  // lies on do not count. Of arrangements: the wall beside which the live face is, or kNoWall, if
+  // the point's own face is not live there.
   std::optional<int> Beyond(Eigen::Index c) const {
     if (clearances.rows() == 0) return std::nullopt;
-    return WallBeyond(clearances.col(c).data(), static_cast<int>(clearances.rows()),
-                      walls[static_cast<std::size_t>(c)]);
+    const WallSet face = walls[static_cast<std::size_t>(c)];
+    if (labels.empty())
+      return WallBeyond(clearances.col(c).data(), static_cast<int>(clearances.rows()), face);
+    if (labels.Piece(face, SignsOf(c)) != 0) return std::nullopt;
+    return labels.Beside(face, SignsOf(c), clearances.col(c).data()).value_or(kNoWall);
+  }
+  // Of arrangements: the wall that meets the point's face the nearest to it. Nothing else shows
+  // such a face before the mesh comes to it: M goes on beyond.
+  std::optional<int> NextWall(Eigen::Index c) const {
+    if (labels.empty()) return std::nullopt;
+    return labels.Nearest(walls[static_cast<std::size_t>(c)], SignsOf(c), clearances.col(c).data());
+  }
+  // As Beyond for the answer to a target whose simplex has these signs. Of arrangements, the point
+  // must be on the same piece: else the wall between the two, or kNoWall.
+  std::optional<int> BeyondFrom(Eigen::Index c, WallSet wanted) const {
+    if (labels.empty() || clearances.rows() == 0) return Beyond(c);
+    const WallSet face = walls[static_cast<std::size_t>(c)];
+    if (labels.Piece(face, SignsOf(c)) == labels.Piece(face, wanted)) return std::nullopt;
+    return labels.Between(face, SignsOf(c), wanted, clearances.col(c).data()).value_or(kNoWall);
   }
 };
 

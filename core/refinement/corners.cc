@@ -38,7 +38,13 @@ std::vector<std::pair<Vector<K>, WallSet>> EdgesAtCorner(const Stars<K>& stars, 
   const Eigen::Matrix<double, K, K> along = -Inverse<K>(conormals);
   int number = 0;
   ForEachWall(walls, [&](int wall) {
-    edges.emplace_back(along.col(number++).normalized(), walls & ~SetOfWall(wall));
+    const Vector<K> inward = along.col(number++).normalized();
+    const WallSet others = walls & ~SetOfWall(wall);
+    const WallSet signs = stars.sample().sectors().Signs(p) & ~SetOfWall(wall);
+    const LabelTable& labels = stars.sample().sectors().labels();
+    if (labels.empty() || labels.Piece(others, signs | SetOfWall(wall)) != 0)
+      edges.emplace_back(inward, others);
+    if (!labels.empty() && labels.Piece(others, signs) != 0) edges.emplace_back(-inward, others);
   });
   return edges;
 }
@@ -92,6 +98,7 @@ template <int K>
 std::optional<CrowdedCorner> Corners<K>::Settle(const AnsweredPoints& answers) {
   std::optional<CrowdedCorner> bad;
   const double same = BoundaryState<K>::kSameCorner * engine_.criteria.epsilon;
+  const LabelTable& labels = engine_.stars.sample().sectors().labels();
   Eigen::Index column = 0;
   for (const auto& crowd : engine_.boundary.TakeCrowds()) {
     const auto dk = Eigen::Index{engine_.stars.sample().d()};
@@ -112,7 +119,7 @@ std::optional<CrowdedCorner> Corners<K>::Settle(const AnsweredPoints& answers) {
       conormals[wall] = (tangents.transpose() * outward).normalized();
       walls |= SetOfWall(wall);
     });
-    if (!IsSubset(crowd.beyond, walls) || engine_.is_full() ||
+    if ((labels.empty() && !IsSubset(crowd.beyond, walls)) || engine_.is_full() ||
         engine_.stars.sample().AnyWithin(crowd.point.data(), same) ||
         engine_.stars.sample().InProtectingBall(crowd.point.data()))
       continue;
@@ -123,6 +130,16 @@ std::optional<CrowdedCorner> Corners<K>::Settle(const AnsweredPoints& answers) {
         all.insert(all.end(), conormals[wall].data(), conormals[wall].data() + K);
       });
     };
+    if (!labels.empty()) {
+      const WallSet active = labels.Active(walls, crowd.signs);
+      if (CountWalls(active) > K) bad = CrowdedCorner{crowd.point, active, 0};
+      if (active != crowd.walls) continue;  // or a corner of fewer walls, where others pass by
+      gather(active);
+      engine_.stars.Add(crowd.point.data(), crowd.tangent.data(), Stars<K>::kNone, active,
+                        all.data(), crowd.signs);
+      if (answers.sizes.size() > 0) engine_.sizes.AppendGiven(crowd.size);
+      continue;
+    }
     gather(walls);
     if (CountWalls(walls) > kMostAtCorner) {
       bad = CrowdedCorner{crowd.point, walls, 0};

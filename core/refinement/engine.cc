@@ -48,7 +48,8 @@ Engine<K>::Engine(const Specification& spec, const ResolvedCriteria& criteria)
       asks_flats_(spec.oracle.intersect_flat),
       random_seed_(spec.random_seed),
       max_vertices_(spec.limits.max_vertices),
-      stars_(spec.ambient_dimension, criteria.epsilon, {criteria.inradius, criteria.centre_rule}),
+      stars_(spec.ambient_dimension, criteria.epsilon, {criteria.inradius, criteria.centre_rule},
+             LabelTable(spec.labels)),
       sizes_(criteria),
       boundary_(spec.walls) {
   // Sizes are estimated from whole stars.
@@ -82,20 +83,23 @@ template <int K>
 std::vector<Target<K>> Engine<K>::SizeAndShapeTargets() const {
   using Entry = typename ViolationIndex<K>::Entry;
   const std::vector<Entry>& entries = violations_.size_and_shape();
-  constexpr std::uint16_t kNone = 0xffff;
-  std::vector<std::uint16_t> worst(stars_.size(), kNone);
+  constexpr std::uint32_t kNone = 0xffffffff;
+  std::vector<std::uint32_t> entry_of(stars_.size(), kNone);
   for (std::size_t i = 0; i < entries.size(); ++i) {
     CheckInterruption(i);
-    worst[entries[i].star] = static_cast<std::uint16_t>(entries[i].violation.vertex);
+    entry_of[entries[i].star] = static_cast<std::uint32_t>(i);
   }
+  const auto simplex_of = [&](const Entry& entry, typename Stars<K>::Simplex* simplex) {
+    return stars_.SimplexOf(entry.star, stars_.cell(entry.star, entry.violation.sector),
+                            entry.violation.vertex, simplex);
+  };
   const auto is_seen_from_lower = [&](const Entry& entry) {
     typename Stars<K>::Simplex simplex, other;
-    if (!stars_.SimplexOf(entry.star, stars_.cell(entry.star), entry.violation.vertex, &simplex))
-      return false;
+    if (!simplex_of(entry, &simplex)) return false;
     for (const std::uint32_t q : simplex) {
       if (q == entry.star) return false;
-      if (worst[q] != kNone && violations_.failed_attempts(q) == 0 &&
-          stars_.SimplexOf(q, stars_.cell(q), worst[q], &other) && other == simplex)
+      if (entry_of[q] != kNone && violations_.failed_attempts(q) == 0 &&
+          simplex_of(entries[entry_of[q]], &other) && other == simplex)
         return true;
     }
     return false;
@@ -255,7 +259,7 @@ void Engine<K>::Append(const AnsweredPoints& answers, Eigen::Index c) {
   const bool on_faces = !answers.walls.empty();
   stars_.Add(answers.points.col(c).data(), answers.tangents.col(c).data(), Stars<K>::kNone,
              on_faces ? answers.walls[static_cast<std::size_t>(c)] : WallSet{0},
-             on_faces ? answers.conormals.col(c).data() : nullptr);
+             on_faces ? answers.conormals.col(c).data() : nullptr, answers.SignsOf(c));
   if (answers.sizes.size() > 0) sizes_.AppendGiven(answers.sizes[c]);
 }
 

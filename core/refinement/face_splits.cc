@@ -31,20 +31,17 @@ bool FaceSplits<K>::IsOnShell(const typename Stars<K>::FaceSimplex& simplex) con
 template <int K>
 bool FaceSplits<K>::IsSliverAtBoundary(std::uint32_t star, const Violation<K>& violation) const {
   if (violation.rule != Rule::kShape || engine_.stars.sample().boundary().empty()) return false;
-  const auto simplex =
-      engine_.stars.FaceSimplexOf(star, engine_.stars.cell(star), violation.vertex);
+  const auto simplex = engine_.stars.FaceSimplexOf(star, engine_.stars.cell(star, violation.sector),
+                                                   violation.vertex);
   return std::any_of(simplex.ids.begin(), simplex.ids.begin() + simplex.count,
                      [&](std::uint32_t id) { return engine_.stars.sample().walls(id) != 0; });
 }
 
 template <int K>
 std::optional<Target<K>> FaceSplits<K>::Of(const typename Stars<K>::CellVertex& at, Rule by) const {
-  const auto& cell = engine_.stars.cell(at.star);
-  Violation<K> violation;
-  violation.rule = std::min(by, Rule::kRadiusEdge);
-  violation.radius = std::sqrt(cell.norm2(at.vertex));
-  std::copy_n(cell.x(at.vertex), K, violation.x);
-  violation.vertex = at.vertex;
+  const auto& cell = engine_.stars.cell(at.star, at.sector);
+  Violation<K> violation =
+      ViolationAt<K>(std::min(by, Rule::kRadiusEdge), cell, at.vertex, false, at.sector);
   violation.walls = WallsAt<K>(cell, at.vertex);
   violation.encroached = true;
   const auto simplex = engine_.stars.FaceSimplexOf(at.star, cell, at.vertex);
@@ -67,15 +64,17 @@ std::optional<Target<K>> FaceSplits<K>::Under(std::uint32_t star,
   if (violation.rule != Rule::kShape || violation.walls != 0 ||
       engine_.violations.failed_attempts(star) == 0)
     return std::nullopt;
-  const auto& cell = engine_.stars.cell(star);
+  const auto& cell = engine_.stars.cell(star, violation.sector);
   WallSet common = engine_.stars.sample().walls(star);
   for (int s = 0; s < K; ++s)
     common &= engine_.stars.sample().walls(cell.id(cell.facet(violation.vertex, s)));
   if (common == 0) return std::nullopt;
   for (int s = 0; s < K; ++s) {
     const std::size_t below = cell.adjacent(violation.vertex, s);
-    if (CountWalls(WallsAt<K>(cell, below)) == 1 && !cell.HasFakeFacet(below))
-      return Of({star, below}, Rule::kShape);
+    const WallSet walls = WallsAt<K>(cell, below);
+    if (CountWalls(walls) == 1 && !cell.HasFakeFacet(below) &&
+        engine_.stars.sample().sectors().Piece(star, violation.sector, walls) != 0)
+      return Of({star, below, violation.sector}, Rule::kShape);
   }
   return std::nullopt;
 }
@@ -88,10 +87,10 @@ void FaceSplits<K>::Yield(std::vector<Target<K>>* targets) {
     return t.violation.rule > Rule::kSize && t.violation.dimension() > lowest;
   });
   std::vector<Target<K>> kept;
-  for (const auto& [star, key, by] : engine_.boundary.TakeSplits()) {
-    const std::size_t v = engine_.stars.cell(star).Find(key);
-    if (v == engine_.stars.cell(star).vertex_count()) continue;
-    if (auto split = Of({star, v}, by)) kept.push_back(*split);
+  for (const auto& [star, key, by, sector] : engine_.boundary.TakeSplits()) {
+    const std::size_t v = engine_.stars.cell(star, sector).Find(key);
+    if (v == engine_.stars.cell(star, sector).vertex_count()) continue;
+    if (auto split = Of({star, v, sector}, by)) kept.push_back(*split);
   }
   const auto encroached = [&](const Target<K>& t) {
     std::vector<double> aim(static_cast<std::size_t>(engine_.stars.sample().d()));

@@ -93,9 +93,9 @@ typename Inserter<K>::RefinedPoint Inserter<K>::JudgeRefined(std::size_t i) cons
   const Stars<K>& stars = to_.stars;
   judged.duplicate =
       stars.sample().AnyWithin(y, Clearance(t)) || stars.sample().InProtectingBall(y);
-  judged.cuts_violation = !judged.duplicate && stars.CutsVertex(t.star, t.violation.vertex, y);
+  judged.cuts_violation = !judged.duplicate && stars.CutsVertex(VertexOf(t), y);
   judged.encroached = stars.EncroachedBy(y, t.violation.walls);
-  judged.beyond = answers_.Beyond(c);
+  judged.beyond = BeyondFrom(t, c);
   judged.near_target =
       !caution_.is_speculative &&
       Distance(y, candidates_.points.col(c).data(), stars.sample().d()) <= kNearAim * t.radius;
@@ -129,8 +129,9 @@ typename Inserter<K>::Outcome Inserter<K>::InsertRefined(std::size_t i, RefinedP
 template <int K>
 bool Inserter<K>::YieldsToFaces(const RefinedPoint& judged, const Target<K>& t, Eigen::Index c) {
   if (judged.encroached) {
-    const auto& [star, vertex] = *judged.encroached;
-    to_.boundary.NoteEncroached({star, to_.stars.cell(star).key(vertex), t.violation.rule});
+    const auto& [star, vertex, sector] = *judged.encroached;
+    to_.boundary.NoteEncroached(
+        {star, to_.stars.cell(star, sector).key(vertex), t.violation.rule, sector});
     return true;
   }
   if (!judged.beyond) return false;
@@ -138,11 +139,16 @@ bool Inserter<K>::YieldsToFaces(const RefinedPoint& judged, const Target<K>& t, 
   return true;
 }
 
-// Whether a point is in M and encroaches on no face.
+// Of a target's answer: as AnsweredPoints::Beyond.
+template <int K>
+std::optional<int> Inserter<K>::BeyondFrom(const Target<K>& t, Eigen::Index c) const {
+  return answers_.BeyondFrom(c, to_.stars.sample().sectors().SignsOf(t.star, t.violation.sector));
+}
+
+// Whether a point that is in M encroaches on no face, and is in no protecting ball.
 template <int K>
 bool Inserter<K>::FitsFaces(Eigen::Index c) const {
-  return !answers_.Beyond(c) &&
-         !to_.stars.sample().InProtectingBall(answers_.points.col(c).data()) &&
+  return !to_.stars.sample().InProtectingBall(answers_.points.col(c).data()) &&
          !to_.stars.EncroachedBy(answers_.points.col(c).data(), WallsOf(c));
 }
 
@@ -156,15 +162,17 @@ int Inserter<K>::BestCandidate(std::size_t i) const {
   for (Eigen::Index c = first; c < candidates_.first[i + 1] && fewest > 0; ++c) {
     if (!answers_.found[static_cast<std::size_t>(c)]) continue;
     const double* y = answers_.points.col(c).data();
-    if (!stars.CutsVertex(t.star, t.violation.vertex, y) ||
-        stars.sample().AnyWithin(y, kGoodPointSpacing * EmptyRadius(t)) || !FitsFaces(c))
+    if (!stars.CutsVertex(VertexOf(t), y) ||
+        stars.sample().AnyWithin(y, kGoodPointSpacing * EmptyRadius(t)) || BeyondFrom(t, c) ||
+        !FitsFaces(c))
       continue;
     const int index = static_cast<int>(c - first);
     if (to_.criteria.candidates == 1) return index;
     stars.TryPoint(y, answers_.tangents.col(c).data(), t.star, &tentative, WallsOf(c),
-                   ConormalsOf(c));
+                   ConormalsOf(c), answers_.SignsOf(c));
     const int bad = CountBad<K>(stars, y, tentative, to_.criteria.shape,
-                                to_.criteria.small_sliver_radius * t.radius, fewest, WallsOf(c));
+                                to_.criteria.small_sliver_radius * t.radius, fewest, WallsOf(c),
+                                answers_.SignsOf(c));
     if (bad < fewest) {
       fewest = bad;
       best = index;
@@ -182,7 +190,7 @@ typename Inserter<K>::Outcome Inserter<K>::InsertGoodPoint(std::size_t i, int be
       if (!answers_.found[static_cast<std::size_t>(c)]) continue;
       RefinedPoint judged;
       judged.encroached = to_.stars.EncroachedBy(answers_.points.col(c).data(), t.violation.walls);
-      judged.beyond = answers_.Beyond(c);
+      judged.beyond = BeyondFrom(t, c);
       if (YieldsToFaces(judged, t, c)) break;
     }
     to_.violations.NoteNoFlat(t.star);  // if that was why
@@ -206,11 +214,13 @@ void Inserter<K>::InsertPlanned() {
     if (CountWalls(WallsOf(c)) == K &&
         to_.boundary.KeepCrowd(answers_, c, BoundaryState<K>::kSameCorner * to_.criteria.epsilon))
       continue;
-    if (!FitsFaces(c)) {
-      if (const auto beyond = answers_.Beyond(c))
-        to_.boundary.Discover(answers_.points.col(c), WallsOf(c), *beyond);
+    if (const auto beyond = answers_.Beyond(c)) {
+      to_.boundary.Discover(answers_.points.col(c), WallsOf(c), *beyond);
       continue;
     }
+    if (!FitsFaces(c)) continue;
+    if (const std::optional<int> next = answers_.NextWall(c); next && to_.boundary.stage() == 0)
+      to_.boundary.Discover(answers_.points.col(c), WallsOf(c), *next);
     if (K - CountWalls(WallsOf(c)) > to_.boundary.stage()) {  // corners and their shells come first
       to_.boundary.KeepSeed(answers_.points.col(c), WallsOf(c));
       continue;
@@ -229,7 +239,7 @@ void Inserter<K>::InsertPlanned() {
 template <int K>
 typename Inserter<K>::Outcome Inserter<K>::Insert(Eigen::Index c, Rule rule, std::uint32_t near) {
   to_.stars.Add(answers_.points.col(c).data(), answers_.tangents.col(c).data(), near, WallsOf(c),
-                ConormalsOf(c));
+                ConormalsOf(c), answers_.SignsOf(c));
   if (answers_.sizes.size() > 0) to_.sizes.AppendGiven(answers_.sizes[c]);
   done_.used[static_cast<std::size_t>(c)] = 1;
   done_.rules.push_back(rule);

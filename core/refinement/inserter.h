@@ -79,7 +79,11 @@ class Inserter {
   Outcome InsertGoodPoint(std::size_t target, int best);
   void InsertPlanned();
   bool YieldsToFaces(const RefinedPoint& judged, const Target<K>& target, Eigen::Index candidate);
+  std::optional<int> BeyondFrom(const Target<K>& target, Eigen::Index candidate) const;
   bool FitsFaces(Eigen::Index candidate) const;
+  static typename Stars<K>::CellVertex VertexOf(const Target<K>& target) {
+    return {target.star, target.violation.vertex, target.violation.sector};
+  }
   WallSet WallsOf(Eigen::Index candidate) const {
     return answers_.walls.empty() ? 0 : answers_.walls[static_cast<std::size_t>(candidate)];
   }

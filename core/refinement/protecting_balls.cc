@@ -47,11 +47,18 @@ struct HalfEdge {
 template <int K>
 std::vector<HalfEdge<K>> EdgesAt(const Stars<K>& stars, std::uint32_t p) {
   std::vector<HalfEdge<K>> edges;
-  const auto& cell = stars.cell(p);
-  for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
-    const auto simplex = stars.FaceSimplexOf(p, cell, v);
-    if (simplex.dimension() != 1 || simplex.fake || simplex.foreign || simplex.count != 2) continue;
-    edges.push_back({{p, v}, simplex.ids[simplex.ids[0] == p]});
+  for (int sector = 0; sector < stars.sample().sectors().Count(p); ++sector) {
+    const auto& cell = stars.cell(p, sector);
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+      const auto simplex = stars.FaceSimplexOf(p, cell, v);
+      if (simplex.dimension() != 1 || simplex.fake || simplex.foreign || simplex.count != 2 ||
+          stars.sample().sectors().Piece(p, sector, simplex.walls) == 0)
+        continue;
+      const std::uint32_t other = simplex.ids[simplex.ids[0] == p];
+      // Several sectors share an edge.
+      if (std::none_of(edges.begin(), edges.end(), [&](const auto& e) { return e.other == other; }))
+        edges.push_back({{p, v, sector}, other});
+    }
   }
   return edges;
 }

@@ -213,12 +213,18 @@ template <int K>
 std::optional<Violation<K>> WorstSharpAngle(const Stars<K>& stars, std::uint32_t p,
                                             const ShapeBounds& bounds, double size_bound) {
   if (bounds.sharpest_cosine >= 1) return std::nullopt;
-  const auto worst =
-      WorstSharp<K>(stars, p, bounds.sharpest_cosine, bounds.sharp_radius * size_bound);
-  if (!worst) return std::nullopt;
-  Violation<K> violation = ViolationAt<K>(Rule::kShape, stars.cell(p), *worst);
-  violation.sharp = true;
-  return violation;
+  std::optional<Violation<K>> largest;
+  for (int sector = 0; sector < stars.sample().sectors().Count(p); ++sector) {
+    const auto worst =
+        WorstSharp<K>(stars, p, bounds.sharpest_cosine, bounds.sharp_radius * size_bound, sector);
+    if (!worst) continue;
+    const Violation<K> violation =
+        ViolationAt<K>(Rule::kShape, stars.cell(p, sector), *worst, false, sector);
+    if (largest && largest->radius >= violation.radius) continue;
+    largest = violation;
+    largest->sharp = true;
+  }
+  return largest;
 }
 
 #define STELLATE_EACH(K)                                                                          \

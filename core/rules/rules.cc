@@ -15,36 +15,73 @@ namespace stellate::core {
 
 namespace {
 
-// Tests a star at the boundary, whose cell's vertices are dual to simplices of several faces.
+// Keeps the worst of the violations that it is offered: of the lowest dimension, then of the first
+// rule, then of the largest radius.
+template <int K>
+class Worst {
+ public:
+  void Offer(Rule rule, const RestrictedVoronoiCell<K>& cell, std::size_t v,
+             const typename Stars<K>::FaceSimplex& simplex, int sector) {
+    const double radius = std::sqrt(cell.norm2(v));
+    if (worst_ && std::tuple(worst_->dimension(), worst_->rule, -worst_->radius) <=
+                      std::tuple(simplex.dimension(), rule, -radius))
+      return;
+    worst_ = ViolationAt<K>(rule, cell, v, simplex.fake, sector);
+    worst_->walls = simplex.walls;
+  }
+  const std::optional<Violation<K>>& worst() const { return worst_; }
+
+ private:
+  std::optional<Violation<K>> worst_;
+};
+
+// Calls visit(v, simplex) for the simplices of a sector of star(p) that are of these dimensions and
+// on live faces, until it returns false.
+template <int K, typename Visit>
+bool VisitFaces(const Stars<K>& stars, std::uint32_t p, int sector, int least, int most,
+                const Visit& visit) {
+  const auto& cell = stars.cell(p, sector);
+  for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+    const auto simplex = stars.FaceSimplexOf(p, cell, v);
+    if (simplex.dimension() < least || simplex.dimension() > most ||
+        stars.sample().sectors().Piece(p, sector, simplex.walls) == 0)
+      continue;
+    if (!visit(v, simplex)) return false;
+  }
+  return true;
+}
+
+// Returns the squared length of the shortest edge at p of a simplex.
+template <int K>
+double ShortestEdge2(const Stars<K>& stars, std::uint32_t p,
+                     const typename Stars<K>::FaceSimplex& simplex) {
+  double edge2 = INFINITY;
+  for (int i = 0; i < simplex.count; ++i) {
+    const std::uint32_t q = simplex.ids[static_cast<std::size_t>(i)];
+    if (q != p)
+      edge2 = std::min(edge2, SquaredDistance(stars.sample().Point(p), stars.sample().Point(q),
+                                              stars.sample().d()));
+  }
+  return edge2;
+}
+
+// Tests a star at the boundary, whose cells' vertices are dual to simplices of several faces.
 template <int K>
 std::optional<Violation<K>> WorstSizeOrShapeOnFaces(const Stars<K>& stars, std::uint32_t p,
                                                     double epsilon, double radius_edge_bound,
                                                     int stage, int least) {
-  const auto& cell = stars.cell(p);
-  std::optional<Violation<K>> worst;
-  for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
-    const auto simplex = stars.FaceSimplexOf(p, cell, v);
-    const int dimension = simplex.dimension();
-    if (dimension < least || dimension > stage) continue;
-    const double norm2 = cell.norm2(v);
-    double edge2 = INFINITY;
-    for (int i = 0; i < simplex.count; ++i) {
-      const std::uint32_t q = simplex.ids[static_cast<std::size_t>(i)];
-      if (q != p)
-        edge2 = std::min(edge2, SquaredDistance(stars.sample().Point(p), stars.sample().Point(q),
-                                                stars.sample().d()));
-    }
-    const bool large = IsTooLarge(simplex.fake, norm2, epsilon);
-    if (!large && !simplex.foreign && !HasShortEdge<K>(stars, p, cell, v, edge2, radius_edge_bound))
-      continue;
-    const Rule rule = large ? Rule::kSize : Rule::kRadiusEdge;
-    if (worst && std::tuple(worst->dimension(), worst->rule, -worst->radius) <=
-                     std::tuple(dimension, rule, -std::sqrt(norm2)))
-      continue;
-    worst = ViolationAt<K>(rule, cell, v, simplex.fake);
-    worst->walls = simplex.walls;
+  Worst<K> worst;
+  for (int sector = 0; sector < stars.sample().sectors().Count(p); ++sector) {
+    const auto& cell = stars.cell(p, sector);
+    VisitFaces<K>(stars, p, sector, least, stage, [&](std::size_t v, const auto& simplex) {
+      const double edge2 = ShortestEdge2<K>(stars, p, simplex);
+      const bool large = IsTooLarge(simplex.fake, cell.norm2(v), epsilon);
+      if (large || simplex.foreign || HasShortEdge<K>(stars, p, cell, v, edge2, radius_edge_bound))
+        worst.Offer(large ? Rule::kSize : Rule::kRadiusEdge, cell, v, simplex, sector);
+      return true;
+    });
   }
-  return worst;
+  return worst.worst();
 }
 
 template <int K>
@@ -52,29 +89,27 @@ std::optional<Violation<K>> WorstSliverOrInconsistentOnFaces(const Stars<K>& sta
                                                              const ShapeBounds& bounds,
                                                              double size_bound, int stage,
                                                              int least) {
-  const auto& cell = stars.cell(p);
-  std::optional<Folds<K>> folds;
-  if (stars.centre_rule() == CentreRule::kCommonCentre) folds.emplace(stars, p);
-  std::optional<Violation<K>> worst;
-  for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
-    const auto simplex = stars.FaceSimplexOf(p, cell, v);
-    const int dimension = simplex.dimension();
-    if (dimension < least || dimension > stage) continue;
-    if (simplex.fake) return std::nullopt;  // R1 gave up there: nothing to judge yet
-    const bool whole = dimension == K, held = simplex.ids[0] == p;
-    const bool thin =
-        whole && held && bounds.sliver_bound > 0 && !stars.TouchesProtectingBall(p, cell, v) &&
-        (HasThinFaceAt<K>(stars, stars.sample().Point(p), cell, v, bounds.sliver_bound, nullptr) ||
-         IsFlatOnWall<K>(stars, p, cell, v));
-    if (!thin && IsConsistent<K>(stars, p, v) && !(whole && folds && folds->IsFolded(v))) continue;
-    const Rule rule = thin ? Rule::kShape : Rule::kInconsistent;
-    if (worst && std::tuple(worst->dimension(), worst->rule, -worst->radius) <=
-                     std::tuple(dimension, rule, -std::sqrt(cell.norm2(v))))
-      continue;
-    worst = ViolationAt<K>(rule, cell, v);
-    worst->walls = simplex.walls;
+  Worst<K> worst;
+  for (int sector = 0; sector < stars.sample().sectors().Count(p); ++sector) {
+    const auto& cell = stars.cell(p, sector);
+    std::optional<Folds<K>> folds;
+    if (stars.centre_rule() == CentreRule::kCommonCentre) folds.emplace(stars, p, sector);
+    const auto judge = [&](std::size_t v, const auto& simplex) {
+      if (simplex.fake) return false;  // R1 gave up there: nothing to judge yet
+      const bool whole = simplex.dimension() == K, held = simplex.ids[0] == p;
+      const bool thin = whole && held && bounds.sliver_bound > 0 &&
+                        !stars.TouchesProtectingBall(p, cell, v) &&
+                        (HasThinFaceAt<K>(stars, stars.sample().Point(p), cell, v,
+                                          bounds.sliver_bound, nullptr) ||
+                         IsFlatOnWall<K>(stars, p, cell, v));
+      if (thin || !IsConsistent<K>(stars, p, v, sector) || (whole && folds && folds->IsFolded(v)))
+        worst.Offer(thin ? Rule::kShape : Rule::kInconsistent, cell, v, simplex, sector);
+      return true;
+    };
+    if (!VisitFaces<K>(stars, p, sector, least, stage, judge)) return std::nullopt;
   }
-  return worst || stage < K ? worst : WorstSharpAngle<K>(stars, p, bounds, size_bound);
+  return worst.worst() || stage < K ? worst.worst()
+                                    : WorstSharpAngle<K>(stars, p, bounds, size_bound);
 }
 
 }  // namespace

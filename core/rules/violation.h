@@ -22,6 +22,7 @@ struct Violation {
   double radius = 0;        // R_p(sigma), length
   double x[K] = {};         // c_p(sigma) in p's tangent coordinates
   std::size_t vertex = 0;   // of p's cell; valid until that changes
+  int sector = 0;           // whose cell that is (Stars::cell)
   bool fake = false;        // not a simplex yet: the cell is unbounded there
   bool tilted = false;      // R3: not a sliver, but tilted too far for a proof
   bool sharp = false;       // R3: not a sliver, but has a sharp dihedral angle
@@ -34,9 +35,10 @@ struct Violation {
 // Returns the violation by the simplex dual to vertex v of p's cell.
 template <int K>
 Violation<K> ViolationAt(Rule rule, const RestrictedVoronoiCell<K>& cell, std::size_t v,
-                         bool fake = false) {
+                         bool fake = false, int sector = 0) {
   Violation<K> violation;
   violation.vertex = v;
+  violation.sector = sector;
   violation.rule = rule;
   violation.radius = std::sqrt(cell.norm2(v));
   std::copy_n(cell.x(v), K, violation.x);

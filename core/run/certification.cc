@@ -15,6 +15,19 @@ namespace {
 
 // max R_p over the simplices that all stars agree on, squared: the others are not in the mesh.
 template <int K>
+double MaxLiveNorm2(const Stars<K>& stars, std::uint32_t p) {
+  double most = 0;
+  for (int sector = 0; sector < stars.sample().sectors().Count(p); ++sector) {
+    const auto& cell = stars.cell(p, sector);
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v)
+      if (cell.norm2(v) > most &&
+          stars.sample().sectors().Piece(p, sector, WallsAt<K>(cell, v)) != 0)
+        most = cell.norm2(v);
+  }
+  return most;
+}
+
+template <int K>
 double MaxAgreedNorm2(const Stars<K>& stars, std::uint32_t p) {
   const auto& cell = stars.cell(p);
   double most = 0;
@@ -30,6 +43,12 @@ MeshView WithSimplices(MeshView mesh, const std::vector<std::uint32_t>& simplice
   mesh.walls = boundary->walls.data();
   mesh.outward = boundary->outward.data();
   mesh.faces = &boundary->faces;
+  if (boundary->table) {
+    mesh.table = boundary->table;
+    mesh.labels = boundary->labels.data();
+    mesh.signs = boundary->signs.data();
+    mesh.one_sided = boundary->one_sided.data();
+  }
   if (!boundary->balls.empty()) mesh.protecting_radii2 = boundary->balls.data();
   return mesh;
 }
@@ -46,7 +65,10 @@ StarFacts FactsOf(Engine<K>& engine) {
   ParallelChunks(stars.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
     double most = 0;
     for (auto p = static_cast<std::uint32_t>(begin); p < end; ++p)
-      most = std::max(most, agreed ? MaxAgreedNorm2<K>(stars, p) : stars.cell(p).max_norm2());
+      most =
+          std::max(most, agreed                                       ? MaxAgreedNorm2<K>(stars, p)
+                         : !stars.sample().sectors().labels().empty() ? MaxLiveNorm2<K>(stars, p)
+                                                                      : stars.cell(p).max_norm2());
     parts[chunk] = most;
   });
   for (const double norm2 : parts)
@@ -75,11 +97,22 @@ BoundaryOfMesh BoundaryOf(const Engine<K>& engine) {
   boundary.outward.assign(std::size_t{stars.size()} * K, 0);
   for (std::uint32_t p = 0; p < stars.size(); ++p) {
     CheckInterruption(p);
-    boundary.walls[p] = stars.sample().walls(p);
-    for (int w = 0; w < CountWalls(stars.sample().walls(p)); ++w)
+    const Site site = stars.sample().At(p, 0);
+    boundary.walls[p] = site.walls;
+    const double* conormal = site.conormals;
+    ForEachWall(site.walls, [&](int wall) {
+      const double sign = IsSubset(SetOfWall(wall), site.reversed) ? -1 : 1;
       for (int a = 0; a < K; ++a)
-        boundary.outward[std::size_t{p} * K + static_cast<std::size_t>(a)] +=
-            stars.sample().Conormals(p)[w * K + a];
+        boundary.outward[std::size_t{p} * K + static_cast<std::size_t>(a)] += sign * *conormal++;
+    });
+  }
+  if (const LabelTable& labels = stars.sample().sectors().labels(); !labels.empty()) {
+    boundary.table = &labels;
+    boundary.labels = stars.LabelsOf(engine.Simplices());
+    for (std::uint32_t p = 0; p < stars.size(); ++p) {
+      boundary.signs.push_back(stars.sample().sectors().Signs(p));
+      boundary.one_sided.push_back(stars.sample().sectors().Count(p) == 1);
+    }
   }
   boundary.faces = FacesOf<K>(engine.stars());
   for (std::uint32_t p = 0; stars.sample().has_protecting_balls() && p < stars.size(); ++p)

@@ -17,8 +17,12 @@ StarFacts FactsOf(Engine<K>& engine);
 
 // The part of MeshView about the boundary.
 struct BoundaryOfMesh {
-  std::vector<WallSet> walls;   // by vertex
-  std::vector<double> outward;  // k tangent coordinates by vertex
+  std::vector<WallSet> walls;       // by vertex
+  std::vector<double> outward;      // k tangent coordinates by vertex
+  std::vector<std::int8_t> labels;  // of arrangements: by simplex; and by vertex, as of MeshView
+  std::vector<WallSet> signs;
+  std::vector<std::uint8_t> one_sided;
+  const LabelTable* table = nullptr;  // borrowed
   std::vector<FaceMesh> faces;
   std::vector<double> balls;  // squared radii of protecting balls, by vertex; empty: none
 };

@@ -191,12 +191,16 @@ void ExplainNearCorners(const Engine<K>& engine, double epsilon, Certificate* ce
       "; move one of these walls, so that it passes farther away, or take a smaller epsilon.");
 }
 
-std::string WhyTooCrowded(const Eigen::VectorXd& point, WallSet walls, WallSet along, int k) {
-  std::string why =
-      Message("walls ", ListWalls(walls), " meet in one point at ", NamePoint(point), ", where ");
-  if (along != 0)
+std::string WhyTooCrowded(const CrowdedCorner& corner, int k, bool has_labels) {
+  const WallSet walls = corner.walls;
+  std::string why = Message("walls ", ListWalls(walls), " meet in one point at ",
+                            NamePoint(corner.point), ", where ");
+  if (has_labels)
+    why += Message("labels differ across all of them: more than ", k,
+                   " walls in a point cannot be meshed with labels");
+  else if (corner.along != 0)
     why += Message("more than ", k - 1, " of them meet along one edge of the manifold (walls ",
-                   ListWalls(along), "), or touch it");
+                   ListWalls(corner.along), "), or touch it");
   else if (CountWalls(walls) > kMostAtCorner)
     why += Message("at most ", kMostAtCorner, " can be distinguished");
   else

@@ -4,6 +4,7 @@
 #include <optional>
 #include <string>
 
+#include "core/refinement/corners.h"
 #include "core/refinement/engine.h"
 #include "core/report.h"
 #include "core/run/crease_probe.h"
@@ -50,9 +51,8 @@ void ExplainWallCurvature(const Engine<K>& engine, double epsilon,
 template <int K>
 void ExplainNearCorners(const Engine<K>& engine, double epsilon, Certificate* certificate);
 
-// Explains why a corner of more than k walls cannot be meshed. `along`: the walls that meet along
-// an edge there, if that is the reason.
-std::string WhyTooCrowded(const Eigen::VectorXd& point, WallSet walls, WallSet along, int k);
+// Explains why a corner of more than k walls cannot be meshed. has_labels: of an arrangement.
+std::string WhyTooCrowded(const CrowdedCorner& corner, int k, bool has_labels);
 
 // Says what still breaks a rule, for people. inconsistent: simplices that DescribeUnfinished
 // counted.

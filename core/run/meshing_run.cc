@@ -107,6 +107,7 @@ Expected<MeshDelta> MeshingRun<K>::Absorb(const Answers& answers) {
   delta.added = std::move(change.added);
   delta.removed = std::move(change.removed);
   const Stars<K>& stars = scheduler_.engine().stars();
+  delta.labels = stars.LabelsOf(delta.added);
   delta.points = Points().rightCols(stars.size() - static_cast<Eigen::Index>(delta.first_vertex));
   if (spec_.walls > 0)
     for (auto v = static_cast<std::uint32_t>(delta.first_vertex); v < stars.size(); ++v)

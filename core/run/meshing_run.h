@@ -35,6 +35,9 @@ class MeshingRun final : public Mesher {
     return scheduler_.engine().stars().sample().TangentMatrix();
   }
   std::vector<std::uint32_t> Simplices() const override { return scheduler_.engine().Simplices(); }
+  std::vector<std::int8_t> Labels() const override {
+    return scheduler_.engine().stars().LabelsOf(Simplices());
+  }
 
  private:
   const std::shared_ptr<QueryBatch>& OpenBatch();

@@ -211,12 +211,22 @@ void RoundTrip<K>::TakeKnown(Eigen::Index c) {
   Eigen::Map<Eigen::Matrix<double, K, K>>(answers_.tangents.col(c).data()).setIdentity();
 }
 
+// A known point is in the region of its target's star, with no live wall between the two.
+template <int K>
+WallSet RoundTrip<K>::SignsOfKnown(Eigen::Index c) const {
+  const auto after = std::upper_bound(candidates_.first.begin(), candidates_.first.end(), c);
+  const auto i = static_cast<std::size_t>(after - candidates_.first.begin()) - 1;
+  return engine_.stars().sample().sectors().Signs(candidates_.targets[i].star);
+}
+
 // Sorts the answers about walls.
 template <int K>
 void RoundTrip<K>::SortFaces(const std::vector<AnswerBlock>& answers) {
   const int d = engine_.stars().sample().d();
   const Eigen::Index count = candidates_.size();
   answers_.walls.assign(static_cast<std::size_t>(count), 0);
+  answers_.labels = engine_.stars().sample().sectors().labels();
+  if (!answers_.labels.empty()) answers_.signs.assign(static_cast<std::size_t>(count), 0);
   answers_.clearances.resize(walls_, count);
   answers_.conormals.resize(K * K, count);
   for (Eigen::Index c = 0; c < count; ++c) {
@@ -224,6 +234,7 @@ void RoundTrip<K>::SortFaces(const std::vector<AnswerBlock>& answers) {
     CheckInterruption(i);
     if (c < candidates_.drawn() && IsKnown(c)) {
       answers_.clearances.col(c).setConstant(INFINITY);  // inside, by an unknown amount
+      if (!answers_.labels.empty()) answers_.signs[i] = SignsOfKnown(c);
       continue;
     }
     const auto [b, column] = places_[i];
@@ -232,6 +243,8 @@ void RoundTrip<K>::SortFaces(const std::vector<AnswerBlock>& answers) {
     answers_.walls[i] = face;
     if (!answers_.found[i]) continue;
     answers_.clearances.col(c) = block.clearances.col(column);
+    if (!answers_.labels.empty())
+      answers_.signs[i] = SignsOf(answers_.clearances.col(c).data(), walls_);
     for (int w = 0; w < CountWalls(face); ++w) {
       const double* conormal = block.conormals.col(column).data() + w * d;
       double* const own = answers_.conormals.col(c).data() + w * K;

@@ -38,6 +38,7 @@ class RoundTrip final : public QuerySource {
     return !known_.empty() && known_[static_cast<std::size_t>(candidate)];
   }
   void TakeKnown(Eigen::Index candidate);
+  WallSet SignsOfKnown(Eigen::Index candidate) const;
   void AskForAll();
   void AskForDrawn();
   void Sort(const std::vector<AnswerBlock>& answers);

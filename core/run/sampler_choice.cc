@@ -60,7 +60,7 @@ bool AreSparse(const Engine<K>& engine, const AnsweredPoints& seeds, const Speci
 // Between walls seeds are no vertices yet, and in no point's way.
 template <int K>
 std::unique_ptr<Sampler<K>> SamplerBetweenWalls(Engine<K>& engine, const Specification& spec) {
-  if (K > kMostBetweenWalls || engine.criteria().graded()) return nullptr;
+  if (K > kMostBetweenWalls || engine.criteria().graded() || !spec.labels.empty()) return nullptr;
   if (K == spec.ambient_dimension) return std::make_unique<SolidSampler<K>>(engine);
   return spec.criteria.speculative ? nullptr : std::make_unique<RingSampler<K>>(engine, spec);
 }

@@ -49,6 +49,8 @@ void Scheduler<K>::KeepFaceSeeds() {
       continue;
     }
     ++inside;
+    if (const std::optional<int> next = answers.NextWall(c); next && answers.walls[i] != 0)
+      engine_.boundary().Discover(answers.points.col(c), answers.walls[i], *next);
     // Not all seeds are used, and one may be the only point known of a piece of its wall.
     spare_points_.KeepEnd(answers, c);
     engine_.boundary().KeepSeed(answers.points.col(c), answers.walls[i], answers.tangents.col(c));
@@ -151,8 +153,7 @@ bool Scheduler<K>::PlanFaces(std::optional<std::vector<Target<K>>>* targets) {
 template <int K>
 void Scheduler<K>::SettleCrowds() {
   const std::optional<CrowdedCorner> bad = Corners<K>(engine_.parts()).Settle(trip_->answers());
-  if (bad)
-    Fail({StatusCode::kOracleBadConormal, WhyTooCrowded(bad->point, bad->walls, bad->along, K)});
+  if (bad) Fail({StatusCode::kOracleBadConormal, WhyTooCrowded(*bad, K, !spec_.labels.empty())});
 }
 
 // Call it when rounds no longer help: leaves the faces of this stage as they are, for the sake of

@@ -38,6 +38,7 @@ void SparePoints::Keep(const AnsweredPoints& answers, const std::vector<std::uin
 }
 
 void SparePoints::KeepClearances(const AnsweredPoints& answers, std::size_t most) {
+  if (!answers.labels.empty()) return;  // a wall that is not live may be anywhere
   const auto walls = static_cast<int>(answers.clearances.rows());
   for (Eigen::Index c = 0; c < answers.clearances.cols(); ++c) {
     CheckInterruption(static_cast<std::size_t>(c));
@@ -58,7 +59,10 @@ void SparePoints::KeepEnd(const AnsweredPoints& answers, Eigen::Index c) {
   const Eigen::VectorXd conormal =
       tangents.reshaped(d, k) * Eigen::VectorXd(answers.conormals.col(c).head(k));
   known_.ends.Add(answers.points.col(c).data(), std::countr_zero(answers.walls[i]), conormal.data(),
-                  static_cast<int>(d_));
+                  static_cast<int>(d_),
+                  answers.labels.empty()
+                      ? std::pair(0, 1)
+                      : answers.labels.Sides(answers.walls[i], answers.SignsOf(c)));
 }
 
 template <int K>

@@ -24,6 +24,11 @@ Specification Good() {
   return spec;
 }
 
+void SetWalls(int walls, Specification* spec) {
+  spec->walls = walls;
+  spec->oracle.conormals = spec->oracle.tangent_basis = true;
+}
+
 struct BadCase {
   const char* words;  // the message names the field and holds the value
   std::function<void(Specification&)> spoil;
@@ -114,6 +119,37 @@ TEST(Validate, NamesTheFieldAndTheValueOfWhatItRefuses) {
        [](auto& s) { s.limits.max_vertices = std::uint64_t{1} << 32; }, StatusCode::kLimitExceeded},
       {"limits.max_rounds is 0 ", [](auto& s) { s.limits.max_rounds = 0; }},
       {"threads is -2 ", [](auto& s) { s.threads = -2; }},
+      {"labels are set without walls",
+       [](auto& s) {
+         s.labels = {0, 1};
+       }},
+      {"labels has 3 entries where 2 walls have 4 ",
+       [](auto& s) {
+         SetWalls(2, &s);
+         s.labels = {0, 1, 1};
+       }},
+      {"labels[1] is -1 ",
+       [](auto& s) {
+         SetWalls(1, &s);
+         s.labels = {0, -1};
+       }},
+      {"labels are all 0",
+       [](auto& s) {
+         SetWalls(1, &s);
+         s.labels = {0, 0};
+       }},
+      {"labels are set for 17 walls but at most 16 ",
+       [](auto& s) {
+         SetWalls(17, &s);
+         s.labels.assign(std::size_t{1} << 17, 1);
+       },
+       StatusCode::kLimitExceeded},
+      {"criteria.speculative is set together with labels",
+       [](auto& s) {
+         SetWalls(1, &s);
+         s.labels = {0, 1};
+         s.criteria.speculative = true;
+       }},
   };
   for (const BadCase& bad : cases) {
     Specification spec = Good();

@@ -31,6 +31,7 @@ class StubMesher : public core::Mesher {
   Eigen::Map<const Eigen::MatrixXd> Points() const override { return {nullptr, 0, 0}; }
   Eigen::MatrixXd Tangents() const override { return {}; }
   std::vector<std::uint32_t> Simplices() const override { return {}; }
+  std::vector<std::int8_t> Labels() const override { return {}; }
 
  protected:
   bool IsOver() const { return report_.termination != core::Termination::kRunning; }

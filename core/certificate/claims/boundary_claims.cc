@@ -1,11 +1,9 @@
 #include "core/certificate/claims/boundary_claims.h"
 
 #include <algorithm>
-#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <numeric>
 #include <string>
 #include <vector>
 
@@ -26,88 +24,33 @@ std::string NameWalls(WallSet walls) {
   return name;
 }
 
-// Counts the faces with `size` vertices in a list of simplices of one dimension.
-std::int64_t CountFaces(const FaceMesh& face, int size) {
-  const auto width = static_cast<std::size_t>(face.dimension) + 1;
-  std::vector<std::array<std::uint32_t, kMaxDimension>> parts;
-  for (std::size_t s = 0; s < face.simplices.size(); s += width)
-    for (unsigned mask = 1; mask < 1u << width; ++mask) {
-      if (std::popcount(mask) != size) continue;
-      std::size_t corners = 0;
-      auto& part = parts.emplace_back();
-      for (std::size_t i = 0; i < width; ++i)
-        if (mask >> i & 1u) part[corners++] = face.simplices[s + i];
-    }
-  std::sort(parts.begin(), parts.end());
-  return std::unique(parts.begin(), parts.end()) - parts.begin();
-}
-
-// Counts the components, and computes the Euler characteristic, of a list of simplices of one
-// dimension.
-void Count(const FaceMesh& face, FaceReport* report) {
-  const auto width = static_cast<std::size_t>(face.dimension) + 1;
-  std::vector<std::uint32_t> vertices = face.simplices;
-  std::sort(vertices.begin(), vertices.end());
-  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
-  std::vector<std::size_t> parent(vertices.size());
-  std::iota(parent.begin(), parent.end(), std::size_t{0});
-  const auto root = [&](std::uint32_t id) {
-    auto v = static_cast<std::size_t>(std::lower_bound(vertices.begin(), vertices.end(), id) -
-                                      vertices.begin());
-    while (parent[v] != v) v = parent[v] = parent[parent[v]];
-    return v;
-  };
-  for (std::size_t s = 0; s < face.simplices.size(); s += width)
-    for (std::size_t i = 1; i < width; ++i)
-      parent[root(face.simplices[s + i])] = root(face.simplices[s]);
-  for (std::size_t v = 0; v < parent.size(); ++v) report->components += parent[v] == v;
-  for (int size = 1; size <= face.dimension + 1; ++size)
-    report->euler_characteristic += (size % 2 == 1 ? 1 : -1) * CountFaces(face, size);
-}
-
 }  // namespace
 
-std::vector<std::uint32_t> BoundaryClaims::CloseOff(const MeshView& mesh) {
-  std::vector<std::uint32_t> all = *mesh.simplices;
-  const auto apex = static_cast<std::uint32_t>(mesh.vertices);
-  for (const FaceMesh& face : *mesh.faces) {
-    if (face.dimension != mesh.k - 1) continue;
-    for (std::size_t s = 0; s < face.simplices.size(); s += static_cast<std::size_t>(mesh.k)) {
-      all.insert(all.end(), face.simplices.begin() + static_cast<std::ptrdiff_t>(s),
-                 face.simplices.begin() + static_cast<std::ptrdiff_t>(s) + mesh.k);
-      all.push_back(apex);
-    }
-  }
-  return all;
-}
-
-void BoundaryClaims::JudgeFaces() {
+void BoundaryClaims::JudgeFaces(const ClosedOff& closed) {
   Certificate& c = x_.certificate;
-  FaceMesh boundary{0, x_.mesh.k - 1, {}};
+  const int k = x_.mesh.k;
+  std::vector<std::uint32_t> boundary;
   for (const FaceMesh& face : *x_.mesh.faces) {
+    const Shape shape = ShapeOf(face.dimension, face.simplices);
     FaceReport report;
     report.walls = face.walls;
     report.dimension = face.dimension;
+    report.sides = face.sides;
     report.simplices = face.simplices.size() / (static_cast<std::size_t>(face.dimension) + 1);
-    Count(face, &report);
+    report.components = shape.components;
+    report.euler_characteristic = shape.euler_characteristic;
     c.faces.push_back(report);
-    if (face.dimension == boundary.dimension)
-      boundary.simplices.insert(boundary.simplices.end(), face.simplices.begin(),
-                                face.simplices.end());
+    if (face.dimension == k - 1 && IsEnd(face))
+      boundary.insert(boundary.end(), face.simplices.begin(), face.simplices.end());
   }
-  c.boundary_simplices = boundary.simplices.size() / static_cast<std::size_t>(x_.mesh.k);
-  FaceReport whole;
-  Count(boundary, &whole);
+  c.boundary_simplices = boundary.size() / static_cast<std::size_t>(k);
+  const Shape whole = ShapeOf(k - 1, boundary);
   c.boundary_components = whole.components;
   c.boundary_euler_characteristic = whole.euler_characteristic;
-  if (boundary.simplices.empty()) return;  // no cone, and no apex
-  // The complex without its cones has fewer faces: those that the cone over the boundary has in
-  // addition to the boundary.
-  c.euler_characteristic += whole.euler_characteristic - 1;
-  if (x_.mesh.k < 3) return;  // circles and points have no links
-  const SimplexList list{x_.mesh.k - 1, static_cast<std::uint32_t>(x_.mesh.vertices),
-                         &boundary.simplices};
-  const Adjacency adjacency(list);
+  c.euler_characteristic += closed.EulerOfRest(k);
+  if (boundary.empty() || k < 3) return;  // circles and points have no links
+  const std::vector<std::uint32_t> parts = closed.Boundary(k);
+  const Adjacency adjacency(SimplexList{k - 1, closed.apex, &parts});
   const LinkReport links = CheckLinks(adjacency);
   if (adjacency.bad_facets() > 0)
     x_.findings.Refuse(Findings::kComplex,

@@ -6,24 +6,19 @@
 #include <vector>
 
 #include "core/batch.h"
+#include "core/certificate/claims/closed_off.h"
 #include "core/certificate/claims/examination.h"
 
 namespace stellate::core {
 
-// The claim that a mesh with boundary ends where its faces are, and only there. Cones to one
-// additional vertex close the boundary off. The mesh is a manifold with boundary if the closed
-// complex has spheres as links, except at that vertex: the link of a boundary vertex is a ball
-// exactly if it becomes a sphere when the cone over its boundary is added.
+// The claim that a mesh with boundary ends where its faces are, and only there.
 class BoundaryClaims {
  public:
   explicit BoundaryClaims(Examination& examination) : x_(examination) {}
 
-  // Returns the simplices and the cones over the boundary's, k+1 ascending ids each. The apex of
-  // the cones has the id mesh.vertices.
-  static std::vector<std::uint32_t> CloseOff(const MeshView& mesh);
   // Fills the certificate's report of each face, and checks that the boundary itself is a closed
-  // manifold.
-  void JudgeFaces();
+  // manifold. `closed`: all of M, closed off.
+  void JudgeFaces(const ClosedOff& closed);
 
   // Returns barycentres of some simplices of the boundary, a block for each wall. JudgeFace takes
   // the answers to one block.

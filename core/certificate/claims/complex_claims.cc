@@ -98,46 +98,46 @@ void RefuseWhatIsUnfinished(Examination& x) {
   }
 }
 
-// Computes the topology from adjacency; for manifolds with boundary, of the closed complex
-// (BoundaryClaims).
-Topology ExamineTopology(const Examination& x, const Adjacency& adjacency) {
+// Computes the topology from adjacency; for manifolds with boundary, of the complex closed off.
+Topology ExamineTopology(const Adjacency& adjacency, const ClosedOff* closed_off) {
   ThrowIfInterrupted();
-  const std::vector<std::uint32_t> closed_off =
-      x.mesh.faces ? BoundaryClaims::CloseOff(x.mesh) : std::vector<std::uint32_t>();
-  const SimplexList& list = adjacency.list();
+  const int k = adjacency.list().k;
   std::optional<Adjacency> closed_adjacency;
-  if (x.mesh.faces)
-    closed_adjacency.emplace(SimplexList{list.k, list.vertices + 1, &closed_off}, list.vertices);
+  if (closed_off) closed_adjacency.emplace(closed_off->list(k), closed_off->apex);
   const Adjacency& closed = closed_adjacency ? *closed_adjacency : adjacency;
   Topology topology;
   ParallelFor(2, [&](int part) {
     if (part == 0)
       topology.connectivity = ComputeConnectivity(adjacency);
     else
-      topology.links = CheckLinks(closed, x.mesh.faces ? list.vertices : VertexStars::kNone);
+      topology.links = CheckLinks(closed, closed_off ? closed_off->apex : VertexStars::kNone);
   });
   topology.bad_facets = closed.bad_facets();
   topology.first_bad_facet = closed.first_bad_facet();
   topology.some_bad_facets = closed.some_bad_facets();
+  if (closed_off) {
+    for (std::uint32_t& id : topology.some_bad_facets) id = closed_off->Original(id);
+    for (std::uint32_t& id : topology.links.some_bad) id = closed_off->Original(id);
+  }
   return topology;
 }
 
 // Measures the stars. Unless all of them embed, also examines the topology by adjacency, to find
 // what is wrong.
-StarGeometry MeasureComplex(Examination& x, Topology* topology) {
+StarGeometry MeasureComplex(Examination& x, const ClosedOff* closed, Topology* topology) {
   if (std::optional<EmbeddedStars> embedded = MeasureIfEmbedded(x.mesh, *x.stars)) {
     topology->connectivity = std::move(embedded->connectivity);
     topology->links.euler_characteristic = embedded->euler_characteristic;
     return std::move(embedded->geometry);
   }
   Adjacency adjacency(std::move(*x.stars));
-  *topology = ExamineTopology(x, adjacency);
+  *topology = ExamineTopology(adjacency, closed);
   StarGeometry stars = MeasureStars(x.mesh, adjacency, topology->connectivity.orientation);
   *x.stars = std::move(adjacency);
   return stars;
 }
 
-void JudgeTopology(Examination& x, const Topology& topology) {
+void JudgeTopology(Examination& x, const ClosedOff* closed, const Topology& topology) {
   const Connectivity& connectivity = topology.connectivity;
   const LinkReport& links = topology.links;
   Certificate& c = x.certificate;
@@ -153,7 +153,9 @@ void JudgeTopology(Examination& x, const Topology& topology) {
              connectivity.some_isolated.end(), std::back_inserter(c.violations.links));
   c.violations.links.resize(std::min(c.violations.links.size(), Violations::kMost));
   c.euler_characteristic = links.euler_characteristic;
-  if (x.mesh.faces) BoundaryClaims(x).JudgeFaces();
+  if (closed) BoundaryClaims(x).JudgeFaces(*closed);
+  if (closed && !closed->wrong_parts.empty())
+    x.findings.Refuse(Findings::kLinks, closed->wrong_parts);
   RefuseWhatIsNoManifold(x, topology);
   RefuseWhatIsUnfinished(x);
 }
@@ -198,9 +200,13 @@ std::optional<StarGeometry> JudgeComplex(Examination& x) {
   x.certificate.inconsistent_simplices = x.facts.inconsistent_simplices;
   x.certificate.max_circumradius = x.facts.max_circumradius;
   if (!IsComplex(x)) return std::nullopt;
+  std::optional<ClosedOff> closed;
+  if (x.mesh.faces)
+    closed =
+        CloseOff(x.mesh, *x.mesh.simplices, 0, [](const FaceMesh& face) { return IsEnd(face); });
   Topology topology;
-  StarGeometry stars = MeasureComplex(x, &topology);
-  JudgeTopology(x, topology);
+  StarGeometry stars = MeasureComplex(x, closed ? &*closed : nullptr, &topology);
+  JudgeTopology(x, closed ? &*closed : nullptr, topology);
   JudgeStars(x, stars);
   x.shape = std::move(stars.shape);
   JudgeSize(x);

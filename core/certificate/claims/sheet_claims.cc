@@ -119,8 +119,10 @@ SheetClaims::SheetClaims(Examination& examination, BoundaryClaims& boundary, End
   for (int wall = 0; wall < x_.spec.walls; ++wall) sheets_.push_back(SheetOf(wall));
 }
 
-// Returns the direction from the apex of the simplex that ends at a facet straight to that facet.
-Eigen::VectorXd SheetClaims::OutwardAt(const std::uint32_t* facet) const {
+// Returns the direction from the apex of the simplex that ends at a facet straight to that facet,
+// or, if that simplex is on the wall's negative side, back.
+Eigen::VectorXd SheetClaims::OutwardAt(const std::uint32_t* facet,
+                                       std::pair<int, int> sides) const {
   const int k = x_.mesh.k;
   for (const std::uint32_t s : x_.stars->Star(facet[0])) {
     const std::uint32_t* ids = x_.list()[s];
@@ -136,7 +138,8 @@ Eigen::VectorXd SheetClaims::OutwardAt(const std::uint32_t* facet) const {
       along.push_back(edge.normalized());
       out -= along.back() * along.back().dot(out);
     }
-    return out;
+    const bool is_behind = x_.mesh.labels && x_.mesh.labels[s] != sides.second;
+    return is_behind ? Eigen::VectorXd(-out) : out;
   }
   return Eigen::VectorXd::Zero(x_.mesh.d);  // none ends there, which is refused: no direction
 }
@@ -144,8 +147,11 @@ Eigen::VectorXd SheetClaims::OutwardAt(const std::uint32_t* facet) const {
 std::unique_ptr<SheetClaims::Sheet> SheetClaims::SheetOf(int wall) const {
   auto sheet = std::make_unique<Sheet>(x_.mesh.d);
   const auto width = static_cast<std::size_t>(x_.mesh.k);
-  for (const FaceMesh& face : *x_.mesh.faces)
-    if (face.walls == SetOfWall(wall)) sheet->simplices = face.simplices;
+  for (const FaceMesh& face : *x_.mesh.faces) {
+    if (face.walls != SetOfWall(wall)) continue;
+    sheet->simplices.insert(sheet->simplices.end(), face.simplices.begin(), face.simplices.end());
+    sheet->sides.resize(sheet->simplices.size() / width, face.sides);
+  }
   for (std::size_t s = 0; s < sheet->simplices.size(); s += width) {
     CheckInterruption(s);
     const std::uint32_t* ids = sheet->simplices.data() + s;
@@ -155,7 +161,7 @@ std::unique_ptr<SheetClaims::Sheet> SheetClaims::SheetOf(int wall) const {
     double radius = 0;
     for (std::size_t i = 0; i < width; ++i)
       radius = std::max(radius, (x_.Vertex(ids[i]) - barycentre).norm());
-    const Eigen::VectorXd outward = OutwardAt(ids);
+    const Eigen::VectorXd outward = OutwardAt(ids, sheet->sides[s / width]);
     sheet->barycentres.insert(sheet->barycentres.end(), barycentre.begin(), barycentre.end());
     sheet->outward.insert(sheet->outward.end(), outward.begin(), outward.end());
     sheet->radii.push_back(radius);
@@ -307,6 +313,7 @@ std::optional<std::uint32_t> SheetClaims::NearestThatEnds(const Sheet& sheet,
   double least = INFINITY;
   for (const std::uint32_t f : near) {
     const double bound = x_.DistanceAllowed(sheet.radii[f]) + x_.position_error;
+    if (sheet.sides[f] != end.sides) continue;
     if (Dot(sheet.outward.data() + f * d, end.conormal, x_.mesh.d) < 0) continue;
     const double squared =
         SquaredDistanceFrom(x_.mesh, sheet.simplices.data() + f * width, x_.mesh.k, end.y);
@@ -317,15 +324,27 @@ std::optional<std::uint32_t> SheetClaims::NearestThatEnds(const Sheet& sheet,
   return nearest;
 }
 
+// Returns the labels on both sides of a wall at a point of it; nothing if the wall is not live
+// there.
+std::optional<std::pair<int, int>> SheetClaims::SidesOf(int wall, const double* clearances) const {
+  const WallSet face = SetOfWall(wall);
+  if (!x_.mesh.table)
+    return WallBeyond(clearances, x_.spec.walls, face) ? std::nullopt
+                                                       : std::optional(std::pair(0, 1));
+  const auto sides = x_.mesh.table->Sides(face, SignsOf(clearances, x_.spec.walls));
+  return sides.first == sides.second ? std::nullopt : std::optional(sides);
+}
+
 void SheetClaims::Judge(std::size_t wall, const Eigen::MatrixXd&, const AnswerBlock& answer) {
   std::vector<End> ends;
   for (Eigen::Index j = 0; j < answer.points.cols(); ++j) {
     const double *y = answer.points.col(j).data(), *conormal = answer.conormals.col(j).data();
-    if (!Found(answer, j) || WallBeyond(answer.clearances.col(j).data(), x_.spec.walls,
-                                        SetOfWall(static_cast<int>(wall))))
-      continue;
-    ends.push_back({y, conormal});
-    ends_.Add(y, static_cast<int>(wall), conormal, x_.mesh.d);
+    if (!Found(answer, j)) continue;
+    const std::optional<std::pair<int, int>> sides =
+        SidesOf(static_cast<int>(wall), answer.clearances.col(j).data());
+    if (!sides) continue;
+    ends.push_back({y, conormal, *sides});
+    ends_.Add(y, static_cast<int>(wall), conormal, x_.mesh.d, *sides);
   }
   JudgeEnds(wall, ends);
 }
@@ -335,7 +354,7 @@ void SheetClaims::JudgeKnown() {
   std::vector<std::vector<End>> ends(sheets_.size());
   for (std::size_t n = 0; n < ends_.walls.size(); ++n)
     ends[static_cast<std::size_t>(ends_.walls[n])].push_back(
-        {ends_.points.data() + n * d, ends_.conormals.data() + n * d});
+        {ends_.points.data() + n * d, ends_.conormals.data() + n * d, ends_.sides[n]});
   for (std::size_t wall = 0; wall < ends.size(); ++wall) JudgeEnds(wall, ends[wall]);
 }
 

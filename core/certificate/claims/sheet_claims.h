@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <utility>
 #include <vector>
 
 #include "core/batch.h"
@@ -44,11 +45,12 @@ class SheetClaims {
     explicit Sheet(int d) : tree(d, &barycentres) {}
     Sheet(Sheet&&) = delete;  // the tree borrows the barycentres
 
-    std::vector<std::uint32_t> simplices;  // k ids each
-    std::vector<double> barycentres;       // d each
-    std::vector<double> outward;           // d each: out of the mesh, within the tangent space of
-                                           // the simplex that ends there
-    std::vector<double> radii;             // around the barycentres
+    std::vector<std::uint32_t> simplices;    // k ids each
+    std::vector<double> barycentres;         // d each
+    std::vector<double> outward;             // d each: out of the mesh, within the tangent space of
+                                             // the simplex that ends there
+    std::vector<double> radii;               // around the barycentres
+    std::vector<std::pair<int, int>> sides;  // as of FaceMesh
     double largest_radius = 0;
     BallTree tree;  // of the barycentres, by these radii
     // By clear point: its clearance over its distance from the mesh; 0: on the wall, or so near the
@@ -56,7 +58,7 @@ class SheetClaims {
     std::vector<double> shares;
   };
   std::unique_ptr<Sheet> SheetOf(int wall) const;
-  Eigen::VectorXd OutwardAt(const std::uint32_t* facet) const;
+  Eigen::VectorXd OutwardAt(const std::uint32_t* facet, std::pair<int, int> sides) const;
   std::vector<std::uint32_t> Spread(const Sheet& sheet, const Eigen::MatrixXd& barycentres,
                                     const std::vector<double>& radii) const;
   double DistanceFrom(const Sheet& sheet, const double* y) const;
@@ -67,8 +69,10 @@ class SheetClaims {
   struct End {
     const double* y;
     const double* conormal;
+    std::pair<int, int> sides;  // as of FaceMesh
   };
   std::optional<std::uint32_t> NearestThatEnds(const Sheet& sheet, const End& end) const;
+  std::optional<std::pair<int, int>> SidesOf(int wall, const double* clearances) const;
   void JudgeEnds(std::size_t wall, const std::vector<End>& ends);
 
   Examination& x_;

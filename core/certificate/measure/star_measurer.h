@@ -216,7 +216,7 @@ class StarMeasurer {
   // Returns for a boundary vertex how far a neighbour is beyond the tangent cone, squared, at
   // least: the manifold bends back over its own boundary there.
   double Beyond2(std::uint32_t p, const Neighbour& n) const {
-    if (CountWalls(mesh_.WallsOf(p)) != 1) return 0;
+    if (CountWalls(mesh_.WallsOf(p)) != 1 || !mesh_.HasOutside(p)) return 0;
     const double beyond = Dot(mesh_.Outward(p), n.u, K);
     return beyond > 0 ? beyond * beyond : 0;
   }
@@ -278,7 +278,7 @@ class StarMeasurer {
     }
     if (const char* why = WhyFolded(p)) return why;
     if (hits != 1) return "covers some directions of its tangent space more than once";
-    return mesh_.WallsOf(p) != 0 && HasSimplexOutward(p)
+    return mesh_.HasOutside(p) && HasSimplexOutward(p)
                ? "covers directions that lie beyond the boundary"
                : nullptr;
   }

@@ -39,7 +39,7 @@ std::optional<Stars<3>::CellVertex> WorstOfAll(const Stars<3>& stars, const doub
       const WallSet at = WallsAt<3>(cell, v);
       const int dimension = 3 - CountWalls(at);
       if (IsSubset(at, walls) || dimension == 0 || cell.HasFakeFacet(v) ||
-          !stars.CutsVertex(p, v, point))
+          !stars.CutsVertex({p, v}, point))
         continue;
       if (dimension > lowest || (dimension == lowest && !(cell.norm2(v) > farthest2))) continue;
       if (!worst && dimension == 3 - CountWalls(walls)) continue;

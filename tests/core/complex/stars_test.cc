@@ -242,9 +242,11 @@ TYPED_TEST(StarsTest, TryPointShowsWhatCommitWouldDo) {
 
     ASSERT_EQ(stars->Add(more.Point(i), more.Tangent(i), near), size);
     const auto change = stars->Commit();
-    EXPECT_EQ(Canonical(stars->cell(size)), Canonical(tentative.own));
+    ASSERT_EQ(tentative.own.size(), 1u);
+    EXPECT_EQ(Canonical(stars->cell(size)), Canonical(tentative.own.front()));
     std::vector<std::uint32_t> cut;
-    for (const auto& [p, cell] : tentative.cut) {
+    for (const auto& [p, sector, cell] : tentative.cut) {
+      EXPECT_EQ(sector, 0);
       cut.push_back(p);
       EXPECT_EQ(Canonical(stars->cell(p)), Canonical(cell)) << "star " << p;
     }

@@ -151,8 +151,8 @@ class Domain {
           }
           const Eigen::VectorXd move = jacobian.fullPivLu().solve(value);
           y -= std::min(1.0, 0.3 / std::max(move.norm(), 1e-300)) * move;
-          if (move.norm() < 1e-14) {
-            answer.found[static_cast<std::size_t>(j)] = 1;
+          if (move.norm() < 1e-14) {  // parallel planes have no point in common
+            answer.found[static_cast<std::size_t>(j)] = value.norm() < 1e-9;
             break;
           }
         }

@@ -26,6 +26,15 @@ inline std::vector<Complex> FacesOf(const Complex& simplices) {
   return faces;
 }
 
+inline std::int64_t EulerOf(const Complex& simplices) {
+  std::int64_t sum = 0, sign = 1;
+  for (const Complex& some : FacesOf(simplices)) {
+    sum += sign * static_cast<std::int64_t>(some.size());
+    sign = -sign;
+  }
+  return sum;
+}
+
 // The ranks of its homology over Z/2, by dimension: columns of the boundary matrices are reduced
 // one by one, those of the highest dimension first, whose lowest rows need no column of their own.
 inline std::vector<int> BettiNumbers(const Complex& simplices) {

@@ -1,0 +1,231 @@
+// Meshes of arrangements of walls: unions, differences, several materials. They are judged by the
+// walls' functions alone, and by homology that does not share the mesher's code.
+
+#include "tests/core/support/arrangements.h"
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <map>
+#include <string>
+#include <tuple>
+
+#include "core/mesher.h"
+#include "tests/core/support/homology.h"
+
+namespace stellate::core {
+namespace {
+
+using testing::Arrangement;
+using testing::Complex;
+using testing::Domain;
+
+struct LabelledMesh {
+  Report report;
+  Eigen::MatrixXd points;
+  std::map<int, Complex> regions;
+};
+
+using Change = std::function<void(const QueryBlock&, AnswerBlock*)>;
+
+// `change`, if given, makes the answers wrong.
+Expected<LabelledMesh> MeshOf(Domain domain, const Specification& spec,
+                              const Change& change = nullptr) {
+  auto created = Mesher::Create(spec);
+  if (!created) return tl::unexpected<Status>(created.error());
+  Mesher& mesher = **created;
+  while (const auto batch = mesher.NextBatch()) {
+    Answers answers = domain.AnswersOf(*batch);
+    for (std::size_t b = 0; change && b < answers.blocks.size(); ++b)
+      change(batch->blocks[b], &answers.blocks[b]);
+    if (auto delta = mesher.Absorb(answers); !delta) return tl::unexpected<Status>(delta.error());
+  }
+  LabelledMesh mesh{mesher.report(), mesher.Points(), {}};
+  const std::vector<std::uint32_t> ids = mesher.Simplices();
+  const std::vector<std::int8_t> labels = mesher.Labels();
+  const auto width = static_cast<std::size_t>(spec.dimension) + 1;
+  for (std::size_t s = 0; s < labels.size(); ++s)
+    mesh.regions[labels[s]].insert({ids.begin() + static_cast<std::ptrdiff_t>(s * width),
+                                    ids.begin() + static_cast<std::ptrdiff_t>((s + 1) * width)});
+  return mesh;
+}
+
+WallSet SignsAt(const Domain& domain, const Eigen::VectorXd& x) {
+  WallSet signs = 0;
+  for (std::size_t w = 0; w < domain.walls.size(); ++w)
+    if (domain.walls[w](x, nullptr) >= 0) signs |= SetOfWall(static_cast<int>(w));
+  return signs;
+}
+
+Eigen::VectorXd Barycentre(const LabelledMesh& mesh, const std::vector<std::uint32_t>& simplex) {
+  Eigen::VectorXd sum = Eigen::VectorXd::Zero(mesh.points.rows());
+  for (const std::uint32_t v : simplex) sum += mesh.points.col(v);
+  return sum / static_cast<double>(simplex.size());
+}
+
+double Volume(const LabelledMesh& mesh, const Complex& simplices) {
+  double volume = 0;
+  for (const auto& simplex : simplices) {
+    const auto k = static_cast<Eigen::Index>(simplex.size()) - 1;
+    Eigen::MatrixXd edges(mesh.points.rows(), k);
+    for (Eigen::Index i = 0; i < k; ++i)
+      edges.col(i) =
+          mesh.points.col(simplex[static_cast<std::size_t>(i) + 1]) - mesh.points.col(simplex[0]);
+    volume += std::sqrt(std::max((edges.transpose() * edges).determinant(), 0.0)) /
+              std::tgamma(static_cast<double>(k) + 1);
+  }
+  return volume;
+}
+
+// The volume of each label in the box, by points on a grid.
+std::map<int, double> VolumesByCounting(const Arrangement& a) {
+  const int d = a.domain.d, steps = d == 2 ? 400 : 60;
+  const Eigen::VectorXd width = a.domain.box.upper - a.domain.box.lower;
+  std::map<int, double> volumes;
+  std::vector<int> at(static_cast<std::size_t>(d), 0);
+  const double each = width.prod() / std::pow(steps, d);
+  for (;;) {
+    Eigen::VectorXd x(d);
+    for (int i = 0; i < d; ++i)
+      x[i] = a.domain.box.lower[i] + width[i] * (at[static_cast<std::size_t>(i)] + 0.5) / steps;
+    volumes[a.label(SignsAt(a.domain, x))] += each;
+    std::size_t i = 0;
+    while (i < at.size() && ++at[i] == steps) at[i++] = 0;
+    if (i == at.size()) break;
+  }
+  volumes.erase(0);
+  return volumes;
+}
+
+class ArrangementsTest : public ::testing::TestWithParam<std::tuple<Arrangement, unsigned>> {};
+
+TEST_P(ArrangementsTest, AreMeshedRegionByRegion) {
+  const auto& [arrangement, seed] = GetParam();
+  const Domain domain = arrangement.domain.Turned(seed);
+  Specification spec = arrangement.SpecificationFor(arrangement.epsilon);
+  spec.bounding_box = BoundingBox{domain.box.lower, domain.box.upper};
+  spec.random_seed = seed + 1;
+  const auto mesh = MeshOf(domain, spec);
+  ASSERT_TRUE(mesh) << mesh.error().message;
+  const Certificate& certificate = mesh->report.certificate;
+  EXPECT_TRUE(certificate.certified) << certificate.verdict;
+
+  ASSERT_EQ(certificate.regions.size(), mesh->regions.size());
+  for (const RegionReport& region : certificate.regions) {
+    const Complex& simplices = mesh->regions.at(region.label);
+    EXPECT_EQ(region.simplices, simplices.size());
+    EXPECT_EQ(region.euler_characteristic, testing::EulerOf(simplices)) << region.label;
+    if (const auto known = arrangement.euler.find(region.label); known != arrangement.euler.end()) {
+      EXPECT_EQ(region.euler_characteristic, known->second) << region.label;
+    }
+  }
+  // Each facet is in two simplices, or M ends there, on a wall.
+  Complex all;
+  for (const auto& [label, simplices] : mesh->regions)
+    all.insert(simplices.begin(), simplices.end());
+  for (const auto& facet : testing::RimOf(all)) {
+    WallSet common = ~WallSet{0};
+    for (const std::uint32_t v : facet)
+      for (int w = 0; w < spec.walls; ++w)
+        if (std::abs(domain.walls[static_cast<std::size_t>(w)](mesh->points.col(v), nullptr)) >
+            1e-9)
+          common &= ~SetOfWall(w);
+    EXPECT_NE(common & (SetOfWall(spec.walls) - 1), 0u) << "a rim that is on no wall";
+  }
+}
+
+// Only simplices at a curved wall may have their barycentre beyond it.
+TEST_P(ArrangementsTest, HaveTheLabelsOfTheirPlaces) {
+  const auto& [arrangement, seed] = GetParam();
+  const Domain domain = arrangement.domain.Turned(seed);
+  Specification spec = arrangement.SpecificationFor(arrangement.epsilon);
+  spec.bounding_box = BoundingBox{domain.box.lower, domain.box.upper};
+  spec.random_seed = seed + 1;
+  const auto mesh = MeshOf(domain, spec);
+  ASSERT_TRUE(mesh) << mesh.error().message;
+  for (const auto& [label, simplices] : mesh->regions)
+    for (const auto& simplex : simplices) {
+      const Eigen::VectorXd at = Barycentre(*mesh, simplex);
+      WallSet unknown = 0;
+      for (int w = 0; w < spec.walls; ++w)
+        for (const std::uint32_t v : simplex)
+          if (std::abs(domain.walls[static_cast<std::size_t>(w)](mesh->points.col(v), nullptr)) <
+              1e-9)
+            unknown |= SetOfWall(w);
+      bool fits = false;
+      for (WallSet part = 0; part < SetOfWall(spec.walls); ++part)
+        fits = fits || (IsSubset(part, unknown) &&
+                        arrangement.label((SignsAt(domain, at) & ~unknown) | part) == label);
+      EXPECT_TRUE(fits) << "label " << label << " at " << at.transpose();
+    }
+  if (arrangement.domain.k < arrangement.domain.d) return;
+  for (const auto& [label, volume] : VolumesByCounting(arrangement))
+    EXPECT_NEAR(Volume(*mesh, mesh->regions.at(label)), volume, 0.12 * volume)
+        << label;  // chords of what is round
+}
+
+// Whatever is wrong with the signs, nothing is certified, or refused as if it were right.
+TEST(Arrangements, WrongSignsAreNotCertified) {
+  const Arrangement venn = testing::PlaneArrangements()[2];
+  const auto flip = [](const QueryBlock&, AnswerBlock* answer) { answer->clearances.row(1) *= -1; };
+  const auto flip_inside = [&](const QueryBlock& asked, AnswerBlock* answer) {
+    if (asked.face == 0) flip(asked, answer);
+  };
+  const auto flip_on_walls = [&](const QueryBlock& asked, AnswerBlock* answer) {
+    if (asked.face != 0) flip(asked, answer);
+  };
+  const auto swap = [](const QueryBlock& asked, AnswerBlock* answer) {
+    if (asked.face == 0) answer->clearances.row(0).swap(answer->clearances.row(1));
+  };
+  for (const Change& change :
+       {Change(flip), Change(flip_inside), Change(flip_on_walls), Change(swap)}) {
+    Specification spec = venn.SpecificationFor(0.3);
+    spec.limits.max_rounds = 300;
+    const auto mesh = MeshOf(venn.domain, spec, change);
+    if (!mesh) {
+      EXPECT_FALSE(mesh.error().message.empty());
+      continue;
+    }
+    EXPECT_FALSE(mesh->report.certificate.certified) << mesh->report.certificate.verdict;
+  }
+}
+
+// A table that knows nothing of a wall that is there: M is what the table says.
+TEST(Arrangements, AWallThatNoLabelDependsOnIsNoConcern) {
+  const Arrangement venn = testing::PlaneArrangements()[2];
+  Specification spec = venn.SpecificationFor(0.3);
+  spec.labels = {0, 1, 0, 1};
+  const auto mesh = MeshOf(venn.domain, spec);
+  ASSERT_TRUE(mesh) << mesh.error().message;
+  EXPECT_TRUE(mesh->report.certificate.certified) << mesh->report.certificate.verdict;
+  ASSERT_EQ(mesh->regions.size(), 1u);
+  EXPECT_NEAR(Volume(*mesh, mesh->regions.at(1)), 3.14159, 0.1);
+}
+
+// The same mesh, bit for bit, for any number of threads.
+TEST(Arrangements, DoNotDependOnThreads) {
+  const Arrangement venn = testing::SpaceArrangements()[1];
+  Specification spec = venn.SpecificationFor(0.4);
+  spec.threads = 1;
+  const auto one = MeshOf(venn.domain, spec);
+  spec.threads = 3;
+  const auto three = MeshOf(venn.domain, spec);
+  ASSERT_TRUE(one && three);
+  EXPECT_EQ(one->points, three->points);
+  EXPECT_EQ(one->regions, three->regions);
+}
+
+std::string NameOf(const ::testing::TestParamInfo<std::tuple<Arrangement, unsigned>>& info) {
+  return std::get<0>(info.param).name + std::to_string(std::get<1>(info.param));
+}
+INSTANTIATE_TEST_SUITE_P(OfThePlane, ArrangementsTest,
+                         ::testing::Combine(::testing::ValuesIn(testing::PlaneArrangements()),
+                                            ::testing::Values(0u, 1u)),
+                         NameOf);
+INSTANTIATE_TEST_SUITE_P(OfSpace, ArrangementsTest,
+                         ::testing::Combine(::testing::ValuesIn(testing::SpaceArrangements()),
+                                            ::testing::Values(1u)),
+                         NameOf);
+
+}  // namespace
+}  // namespace stellate::core
