@@ -76,6 +76,16 @@ void BoundaryToProto(const core::Certificate& c, v1::Certificate* out) {
     one->set_simplices(face.simplices);
     one->set_components(face.components);
     one->set_euler_characteristic(face.euler_characteristic);
+    if (c.regions.empty() || core::CountWalls(face.walls) != 1) continue;
+    one->set_label_below(static_cast<std::uint32_t>(face.sides.first));
+    one->set_label_above(static_cast<std::uint32_t>(face.sides.second));
+  }
+  for (const core::RegionReport& region : c.regions) {
+    v1::RegionCertificate* const one = out->add_regions();
+    one->set_label(static_cast<std::uint32_t>(region.label));
+    one->set_simplices(region.simplices);
+    one->set_components(region.components);
+    one->set_euler_characteristic(region.euler_characteristic);
   }
   if (!c.sharpest) return;
   add_walls(c.sharpest->walls, out->mutable_sharpest());
@@ -270,6 +280,7 @@ void ToProto(const DeltaPart& part, int k, int d, v1::DeltaChunk* out) {
   ToProto(part.removed, row_size, delta->mutable_removed());
   delta->mutable_boundary_vertices()->Add(part.boundary.begin(), part.boundary.end());
   delta->mutable_boundary_walls()->Add(part.walls.begin(), part.walls.end());
+  delta->mutable_added_labels()->assign(part.labels.begin(), part.labels.end());
   out->set_complete(part.complete);
 }
 
@@ -286,6 +297,7 @@ void ToProto(const DeltaPart& part, int k, int d, v1::DownloadMeshResponse* out)
     out->mutable_orientation()->set_turned(part.orientation->turned.data(),
                                            part.orientation->turned.size());
   }
+  out->mutable_cell_labels()->assign(part.labels.begin(), part.labels.end());
   out->set_complete(part.complete);
 }
 

@@ -240,6 +240,7 @@ Allowed<MeshRequest> FromProto(const v1::MeshSpec& spec, const Config& config) {
   request.label = spec.label();
   request.about = spec.oracle().about();
   Refused status = ToInt(spec.walls(), "walls", &request.spec.walls);
+  request.spec.labels.assign(spec.labels().begin(), spec.labels().end());
   if (status.ok()) status = ReadDimensions(spec, config, &request.spec);
   if (status.ok()) status = ReadPlace(spec, &request.spec);
   if (status.ok()) status = ReadAudit(spec, &request.spec);
@@ -266,6 +267,7 @@ void ToProto(const core::Specification& spec, v1::MeshSpec* out) {
   out->mutable_oracle()->set_local_size(spec.oracle.local_size);
   out->mutable_oracle()->set_conormals(spec.oracle.conormals);
   out->set_walls(static_cast<std::uint32_t>(spec.walls));
+  out->set_labels(std::string(spec.labels.begin(), spec.labels.end()));
   if (spec.bounding_box) {
     const auto d = static_cast<std::size_t>(spec.bounding_box->lower.size());
     v1::BoundingBox* const box = out->mutable_bounding_box();

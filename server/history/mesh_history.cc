@@ -62,6 +62,7 @@ MeshHistory::MeshHistory(int dimension, int ambient_dimension)
       points_(d_),
       rows_(row_size_),
       lives_(1),
+      labels_(1),
       deaths_(1),
       marks_(1),
       next_(1) {}
@@ -128,6 +129,7 @@ Status MeshHistory::Append(const core::MeshDelta& delta) {
       if (delta.walls[v] != 0) boundary_.push_back({last.vertices + v, delta.walls[v]});
     rows_.Append(delta.added.data(), new_simplices);
     lives_.Append(births.data(), new_simplices);
+    labels_.Append(delta.labels.data(), delta.labels.size());
     marks_.push_back({last.vertices + new_vertices, first_simplex + new_simplices, deaths_.size()});
   }
   first_of_.resize(marks_.back().vertices, kNone);
@@ -187,7 +189,7 @@ bool MeshHistory::Write(const Sink& write) const {
   return write(&revisions, sizeof(revisions)) &&
          write(marks_.data() + 1, revisions * sizeof(Mark)) && WriteRows(points_, d_, write) &&
          WriteRows(rows_, row_size_, write) && WriteRows(deaths_, 1, write) && WriteWalls(write) &&
-         WriteOrientation(write);
+         WriteOrientation(write) && WriteLabels(write);
 }
 
 bool MeshHistory::WriteWalls(const Sink& write) const {
@@ -234,6 +236,18 @@ bool MeshHistory::ReadOrientation(const Source& read) {
           read(orientation_->turned.data(), orientation_->turned.size()));
 }
 
+bool MeshHistory::WriteLabels(const Sink& write) const {
+  return labels_.size() == 0 || WriteRows(labels_, 1, write);
+}
+
+bool MeshHistory::ReadLabels(const Source& read) {
+  std::int8_t first = 0;
+  const std::uint64_t simplices = marks_.back().simplices;
+  if (simplices == 0 || !read(&first, sizeof(first))) return true;
+  labels_.Append(&first, 1);
+  return ReadInto(&labels_, 1, simplices - 1, read);
+}
+
 core::Expected<std::unique_ptr<MeshHistory>> MeshHistory::Read(int dimension, int ambient_dimension,
                                                                const Source& read) {
   auto history = std::make_unique<MeshHistory>(dimension, ambient_dimension);
@@ -260,7 +274,8 @@ bool MeshHistory::ReadRows(const Source& read) {
   return end.vertices <= kNone && end.simplices < kNone &&
          ReadInto(&points_, d_, end.vertices, read) &&
          ReadInto(&rows_, row_size_, end.simplices, read) &&
-         ReadInto(&deaths_, 1, end.deaths, read) && ReadWalls(read) && ReadOrientation(read);
+         ReadInto(&deaths_, 1, end.deaths, read) && ReadWalls(read) && ReadOrientation(read) &&
+         ReadLabels(read);
 }
 
 // From the order of births and deaths.
@@ -295,9 +310,10 @@ MeshHistory::Cursor MeshHistory::Begin(std::uint64_t from) const {
 
 std::uint64_t MeshHistory::MemoryBytes() const {
   const std::lock_guard lock(mutex_);
-  return points_.bytes() + boundary_.capacity() * sizeof(OnWalls) + turned_by_row_.capacity() +
-         (orientation_ ? orientation_->turned.capacity() : 0) + rows_.bytes() + lives_.bytes() +
-         deaths_.bytes() + marks_.capacity() * sizeof(Mark) + appenders_bytes_;
+  return points_.bytes() + labels_.bytes() + boundary_.capacity() * sizeof(OnWalls) +
+         turned_by_row_.capacity() + (orientation_ ? orientation_->turned.capacity() : 0) +
+         rows_.bytes() + lives_.bytes() + deaths_.bytes() + marks_.capacity() * sizeof(Mark) +
+         appenders_bytes_;
 }
 
 MeshHistory::Snapshot MeshHistory::At(std::uint64_t revision) const {
@@ -387,6 +403,7 @@ void MeshHistory::AppendAdded(Cursor* cursor, std::size_t end, std::size_t max_r
     ++rows;
     const std::uint32_t* const row = rows_[cursor->added];
     part->added.insert(part->added.end(), row, row + row_size_);
+    if (labels_.size() > 0) part->labels.push_back(*labels_[cursor->added]);
     if (!has_bits) continue;
     std::vector<std::uint8_t>& turned = part->orientation->turned;
     turned.resize(BytesOfBits(rows));

@@ -69,6 +69,7 @@ struct DeltaPart {
   std::uint64_t first_vertex = 0;
   std::vector<double> points;                 // d each
   std::vector<std::uint32_t> added, removed;  // k+1 each; none is in both
+  std::vector<std::int8_t> labels;            // of those added; empty without labels
   // The vertices among them that are on walls, and the walls of each.
   std::vector<std::uint32_t> boundary;
   std::vector<core::WallSet> walls;
@@ -153,6 +154,8 @@ class MeshHistory {
   bool WriteOrientation(const Sink& write) const;
   bool ReadOrientation(const Source& read);
   std::vector<std::uint32_t> SortLiving() const;
+  bool WriteLabels(const Sink& write) const;
+  bool ReadLabels(const Source& read);
   bool ComputeLives();
   std::uint32_t Unlink(const std::uint32_t* row);
   void Link(std::uint32_t simplex);
@@ -170,6 +173,7 @@ class MeshHistory {
   std::vector<OnWalls> boundary_;      // of the vertices, ascending
   GrowingRows<std::uint32_t> rows_;    // ids of every simplex so far
   GrowingRows<Life> lives_;            // by simplex
+  GrowingRows<std::int8_t> labels_;    // by simplex, of an arrangement of walls; else empty
   GrowingRows<std::uint32_t> deaths_;  // simplices in the order of their removal
   struct Mark {
     std::uint64_t vertices = 0, simplices = 0, deaths = 0;

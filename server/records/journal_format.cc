@@ -51,6 +51,7 @@ void LayOutSpecification(Archive& archive, Value& spec) {
   archive.Number(spec.limits.max_batch_queries);
   archive.Number(spec.threads);
   archive.Number(spec.walls);
+  archive.Bytes(spec.labels);
   archive.Number(spec.oracle.conormals);
 }
 

@@ -63,6 +63,7 @@ class RecordWriter {
   }
   void Bytes(const std::string& bytes) { Array(bytes.data(), bytes.size()); }
   void Bytes(const std::vector<std::uint8_t>& bytes) { Array(bytes.data(), bytes.size()); }
+  void Bytes(const std::vector<std::int8_t>& bytes) { Array(bytes.data(), bytes.size()); }
   void Ids(const std::vector<std::uint32_t>& ids) {
     Array(ids.data(), ids.size() * sizeof(ids[0]));
   }

@@ -87,6 +87,19 @@ void LayOutBoundary(Archive& archive, Value& certificate) {
     archive.Number(face.simplices);
     archive.Number(face.components);
     archive.Number(face.euler_characteristic);
+    archive.Number(face.sides.first);
+    archive.Number(face.sides.second);
+  }
+  count = certificate.regions.size();
+  archive.Number(count);
+  if constexpr (!std::is_const_v<Value>) {
+    for (std::size_t i = 0; i < count && archive.good(); ++i) certificate.regions.emplace_back();
+  }
+  for (auto& region : certificate.regions) {
+    archive.Number(region.label);
+    archive.Number(region.simplices);
+    archive.Number(region.components);
+    archive.Number(region.euler_characteristic);
   }
 }
 

@@ -86,6 +86,24 @@ TEST(ConvertSpec, RoundTrip) {
   EXPECT_EQ(back.limits().max_batch_queries(), 4000u);
 }
 
+TEST(ConvertSpec, LabelsAreBytesOfSignVectors) {
+  v1::MeshSpec spec = GoodSpec();
+  spec.set_walls(2);
+  spec.mutable_oracle()->set_tangent_basis(true);
+  spec.mutable_oracle()->set_conormals(true);
+  spec.set_labels(std::string("\0\1\2\x7f", 4));
+  const auto request = FromProto(spec, Config{});
+  ASSERT_TRUE(request) << request.error().message;
+  EXPECT_EQ(request->spec.labels, (std::vector<std::int8_t>{0, 1, 2, 127}));
+  v1::MeshSpec back;
+  ToProto(request->spec, &back);
+  EXPECT_EQ(back.labels(), spec.labels());
+  spec.set_labels(std::string("\0\x80\0\0", 4));
+  const auto refused = FromProto(spec, Config{});
+  ASSERT_FALSE(refused);
+  EXPECT_TRUE(refused.error().message.starts_with("labels[1] is -128"));
+}
+
 TEST(ConvertSpec, SeedsBecomeColumns) {
   v1::MeshSpec spec = GoodSpec();
   *spec.mutable_seeds() = Numbers({1, 0, 0, 0, 1, 0}, {2, 3});
@@ -306,6 +324,24 @@ TEST(ConvertMesh, DeltasKeepTheirRows) {
   std::uint32_t last = 0;
   std::memcpy(&last, out.delta().added().data().data() + 8, 4);
   EXPECT_EQ(last, 7u);
+}
+
+TEST(ConvertReport, TellsOfRegionsAndOfTheSidesOfTheirWalls) {
+  core::Report report;
+  report.certificate.regions = {{2, 30, 1, 1}, {5, 40, 2, -1}};
+  report.certificate.faces = {{core::WallSet{3}, 1, 7, 2, 0},
+                              {core::WallSet{1}, 2, 9, 1, 1, {5, 2}}};
+  v1::Report sent;
+  ToProto(report, 3, &sent);
+  const v1::Certificate& certificate = sent.certificate();
+  ASSERT_EQ(certificate.regions_size(), 2);
+  EXPECT_EQ(certificate.regions(1).label(), 5u);
+  EXPECT_EQ(certificate.regions(1).simplices(), 40u);
+  EXPECT_EQ(certificate.regions(1).components(), 2u);
+  EXPECT_EQ(certificate.regions(1).euler_characteristic(), -1);
+  EXPECT_FALSE(certificate.faces(0).has_label_below()) << "an edge has more than two sides";
+  EXPECT_EQ(certificate.faces(1).label_below(), 5u);
+  EXPECT_EQ(certificate.faces(1).label_above(), 2u);
 }
 
 TEST(ConvertReport, TellsOfFacesAndWhereWallsMeetMostSharply) {

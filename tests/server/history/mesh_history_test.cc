@@ -7,6 +7,7 @@
 #include <atomic>
 #include <cstdlib>
 #include <cstring>
+#include <map>
 #include <memory>
 #include <new>
 #include <random>
@@ -152,6 +153,42 @@ TEST_P(MeshHistoryTest, AnyRevisionLeadsToAnyLaterOne) {
   }
 }
 INSTANTIATE_TEST_SUITE_P(PartSizes, MeshHistoryTest, ::testing::Values(24, 60, 1 << 20));
+
+// Of arrangements: each simplex comes with its label, in any part, and from a record.
+TEST(MeshHistory, LabelsComeWithTheirSimplices) {
+  MeshHistory mesh(kDimension, kAmbient);
+  core::MeshDelta first = Delta(1, 0, 4, {{0, 1, 2}, {1, 2, 3}}, {});
+  first.labels = {5, 6};
+  core::MeshDelta second = Delta(2, 4, 1, {{0, 1, 4}, {0, 2, 4}}, {{0, 1, 2}});
+  second.labels = {7, 8};
+  ASSERT_TRUE(mesh.Append(first).ok());
+  ASSERT_TRUE(mesh.Append(second).ok());
+  std::string bytes;
+  ASSERT_TRUE(mesh.Write([&](const void* data, std::size_t size) {
+    bytes.append(static_cast<const char*>(data), size);
+    return true;
+  }));
+  std::size_t at = 0;
+  const auto copy = MeshHistory::Read(kDimension, kAmbient, [&](void* data, std::size_t size) {
+    if (bytes.size() - at < size) return false;
+    std::copy_n(bytes.data() + at, size, static_cast<char*>(data));
+    at += size;
+    return true;
+  });
+  ASSERT_TRUE(copy) << copy.error().message;
+  for (const MeshHistory* history : {&mesh, copy->get()})
+    for (const std::size_t max_bytes : {12, 1 << 20}) {
+      std::map<Triangle, int> labels;
+      MeshHistory::Cursor cursor = history->BeginAt(2, 0);
+      for (DeltaPart part; !part.complete;) {
+        part = history->Next(&cursor, max_bytes);
+        ASSERT_EQ(part.labels.size() * 3, part.added.size());
+        for (std::size_t i = 0; i < part.labels.size(); ++i)
+          labels[{part.added.begin() + 3 * i, part.added.begin() + 3 * i + 3}] = part.labels[i];
+      }
+      EXPECT_EQ(labels, (std::map<Triangle, int>{{{1, 2, 3}, 6}, {{0, 1, 4}, 7}, {{0, 2, 4}, 8}}));
+    }
+}
 
 TEST(MeshHistory, APartBegunBeforeMoreCameLeadsWhereItSaid) {
   std::mt19937 random(11);
