@@ -163,12 +163,15 @@ class Checkpoint:
             with file, np.load(file, allow_pickle=False) as kept:
                 points, simplices = kept["points"], kept["simplices"]
                 walls = kept["walls"] if "walls" in kept else None
+                labels = kept["labels"] if "labels" in kept else None
                 about = json.loads(str(kept["about"]))
             if about["digest"] != _digest(spec):
                 raise ValueError("its digest is of another specification")
             progress = about["progress"] and Progress(**about["progress"])
             report = Report.from_fields(about["report"])
-            return FinishedMesh(points, simplices, report, progress, about["revision"], walls)
+            return FinishedMesh(
+                points, simplices, report, progress, about["revision"], walls, labels=labels
+            )
         except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
             raise InvalidArgument(
                 f"{self._mesh_path} is no mesh that was kept ({error}): remove {self.directory}"
@@ -185,6 +188,8 @@ class Checkpoint:
         arrays = {"points": mesh.points, "simplices": mesh.simplices}
         if mesh.walls is not None:
             arrays["walls"] = mesh.walls
+        if mesh.labels is not None:
+            arrays["labels"] = mesh.labels
         self._replace(
             self._mesh_path,
             lambda file: np.savez(file, about=np.array(json.dumps(about)), **arrays),

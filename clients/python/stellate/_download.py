@@ -11,7 +11,13 @@ from ._files.formats import check_save
 from ._info import MeshInfo, unless_failed
 from ._mesh import Mesh, with_report
 from ._wire.arrays import from_wire, indices_from_wire
-from ._wire.delta_mesh import lexicographic, spread_walls, walls_from_wire
+from ._wire.delta_mesh import (
+    labels_from_wire,
+    lexicographic,
+    spread_labels,
+    spread_walls,
+    walls_from_wire,
+)
 from ._wire.orientation import Orientation
 from .client import Client
 from .errors import FailedPrecondition, protocol_error
@@ -74,6 +80,7 @@ def _assemble(client: Client, info: MeshInfo, revision: int, on_part: OnPart | N
     boundary: list[tuple[np.ndarray, np.ndarray]] = []
     turned: list[np.ndarray] = []  # (m,) bool, of the rows
     orientable: bool | None = True  # None: not told of all
+    labels: list[tuple[np.ndarray, np.ndarray]] = []
     vertices = simplices = 0
     parts = client.parts(info.name, revision)
     try:
@@ -90,6 +97,7 @@ def _assemble(client: Client, info: MeshInfo, revision: int, on_part: OnPart | N
                     orientable = bits.orientable
                     told = Orientation.from_bits(bits.orientable, bits.turned, len(cells))
                     turned.append(told.flags(len(cells) if orientable else 0))
+                labels += labels_from_wire(part.cell_labels, cells)
             except ValueError as error:
                 raise protocol_error(str(error)) from error
             if len(block) and part.first_vertex != vertices:
@@ -121,13 +129,15 @@ def _assemble(client: Client, info: MeshInfo, revision: int, on_part: OnPart | N
             else Orientation(False)
         )
     last = info.end_time is not None and revision == info.revision
+    cells = cells[order].astype(np.int64)
     mesh = Mesh(
         np.concatenate(points),
-        cells[order].astype(np.int64),
+        cells,
         None,
         info.progress if last else None,
         revision,
         spread_walls(boundary, vertices),
         orientation,
+        spread_labels(labels, cells),
     )
     return with_report(mesh, info.report if last else None)

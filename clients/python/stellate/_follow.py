@@ -62,7 +62,13 @@ class Following:
         simplices = _sound(self._growth.simplices)
         growth = self._growth
         return Mesh(
-            growth.points(), simplices, None, self._progress, growth.revision, growth.walls()
+            growth.points(),
+            simplices,
+            None,
+            self._progress,
+            growth.revision,
+            growth.walls(),
+            labels=growth.labels(),
         )
 
     def stop(self) -> None:
@@ -95,6 +101,7 @@ def _finished(growth: DeltaMesh, final: MeshInfo) -> FinishedMesh:
             growth.revision,
             growth.walls(),
             orientation,
+            growth.labels(),
         ),
         final.report,
     )

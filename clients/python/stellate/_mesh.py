@@ -37,6 +37,7 @@ class Mesh:
       walls: of a manifold with boundary, (n,) uint64: the walls that each point lies on, wall i as
         bit i; else None.
       orientation: how the simplices are oriented, as the server says of a mesh that is over; else None.
+      labels: of an arrangement of walls, (m,) int8: the region that each simplex is in; else None.
     """
 
     points: np.ndarray
@@ -46,6 +47,15 @@ class Mesh:
     revision: int = 0
     walls: np.ndarray | None = None
     orientation: Orientation | None = dataclasses.field(default=None, repr=False)
+    labels: np.ndarray | None = None
+
+    def region(self, label: int) -> Mesh:
+        """The part with one label, of the same points. Its boundary is where it ends or meets others."""
+        if self.labels is None or not (self.labels == label).any():
+            have = () if self.labels is None else np.unique(self.labels).tolist()
+            raise ValueError(f"the mesh has no region {label!r}; it has {list(have)}")
+        rows = self.simplices[self.labels == label]
+        return Mesh(self.points, rows, None, None, self.revision, self.walls)
 
     @property
     def boundary(self) -> tuple[Face, ...]:
@@ -282,6 +292,7 @@ def with_report(mesh: Mesh, report: Report | None) -> Mesh:
         mesh.revision,
         mesh.walls,
         mesh.orientation,
+        mesh.labels,
     )
 
 

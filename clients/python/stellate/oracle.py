@@ -43,6 +43,11 @@ class Oracle(Protocol):
       clearances(points (n, d)) -> (n, walls): the g_i, of which the sign counts.
       conormals(points (n, d), face) -> (n, len(face), d): at points of a face, the outward unit normal
         of each of its walls within the tangent space. stellate.oracles.Clipped has all of these.
+      labels: (2^walls,) whole numbers from 0 to 127, for walls of which M is not all that is positive:
+        unions, differences, several materials. Entry s is the label of the points where wall i is
+        positive if bit i of s is set, and else negative. M is where the label is not 0; its regions,
+        one for each label, are meshed together, and mesh.labels says which simplex is in which. At
+        most 16 walls may have labels.
       jacobian(points (n, d)) -> (n, m, d): of the equations that M is given by, if it is. Only
         stellate.check asks, to find where they lose rank.
       bounding_box: (lower (d,), upper (d,)), where to look for M, or
@@ -77,6 +82,7 @@ class CheckedOracle:
         self.has_local_size = callable(getattr(oracle, "local_size", None))
         self.has_jacobian = callable(getattr(oracle, "jacobian", None))
         self.walls = self._count_walls(oracle)
+        self.labels = _labels(getattr(oracle, "labels", None), self.walls)
         self.about = _sentence(getattr(oracle, "about", ""))
         self.bounding_box = _box(getattr(oracle, "bounding_box", None))
         seeds = getattr(oracle, "seeds", None)
@@ -281,6 +287,21 @@ def _flags(method: str, found: Any, count: int) -> np.ndarray:
             "ORACLE_SHAPE",
         )
     return flags.astype(bool)
+
+
+def _labels(labels: Any, walls: int) -> bytes:
+    """Of the sign vectors of the walls, a byte each; none without labels."""
+    if labels is None:
+        return b""
+    given = np.asarray(labels)
+    if given.shape != (1 << min(walls, 16),):
+        raise InvalidArgument(
+            f"labels has the shape {given.shape}, and {walls} walls have {1 << walls} vectors of signs: "
+            "give one for each, in an array of one axis"
+        )
+    if given.dtype.kind not in "iub" or given.min() < 0 or given.max() > 127:
+        raise InvalidArgument("labels have to be whole numbers from 0, outside of M, to 127")
+    return given.astype(np.int8).tobytes()
 
 
 def _whole_number(oracle: Any, name: str) -> int:

@@ -20,6 +20,7 @@ __all__ = [
     "Certificate",
     "Counts",
     "FaceCertificate",
+    "RegionCertificate",
     "Failure",
     "Progress",
     "Report",
@@ -121,12 +122,25 @@ class FaceCertificate:
     simplices: int
     components: int
     euler_characteristic: int
+    # Of a wall of an arrangement: the labels where it is negative and where it is positive.
+    label_below: int | None = None
+    label_above: int | None = None
 
     @classmethod
     def from_fields(cls, fields: dict[str, Any]) -> FaceCertificate:
         """Back from dataclasses.asdict(face), or from JSON of it."""
         plain: dict[str, Any] = {**fields, "walls": tuple(fields["walls"])}
         return cls(**plain)
+
+
+@dataclasses.dataclass(frozen=True)
+class RegionCertificate:
+    """A region of an arrangement of walls: the part of the mesh with one label."""
+
+    label: int
+    simplices: int
+    components: int
+    euler_characteristic: int
 
 
 @dataclasses.dataclass(frozen=True)
@@ -182,6 +196,7 @@ class Certificate:
     boundary_euler_characteristic: int = 0
     faces: tuple[FaceCertificate, ...] = ()  # by dimension, the lowest first
     sharpest: WallAngle | None = None  # where walls meet at the smallest angle, if any meet
+    regions: tuple[RegionCertificate, ...] = ()  # of an arrangement of walls, by label
     only_too_coarse: bool = False  # refused for its size alone: nothing seen contradicts it
 
 
@@ -256,6 +271,8 @@ class Report:
         if "faces" in certificate:
             faces = map(FaceCertificate.from_fields, certificate["faces"])
             certificate["faces"] = tuple(faces)
+        regions = certificate.get("regions", ())  # checkpoints of earlier versions lack it
+        certificate["regions"] = tuple(RegionCertificate(**region) for region in regions)
         if certificate.get("sharpest"):
             certificate["sharpest"] = WallAngle.from_fields(certificate["sharpest"])
         more = {
@@ -323,9 +340,19 @@ def _certificate(message: pb.Certificate) -> Certificate:
     violations = Violations.from_wire(message.violations)
     faces = tuple(
         FaceCertificate(
-            tuple(f.walls), f.dimension, f.simplices, f.components, f.euler_characteristic
+            tuple(f.walls),
+            f.dimension,
+            f.simplices,
+            f.components,
+            f.euler_characteristic,
+            f.label_below if f.HasField("label_below") else None,
+            f.label_above if f.HasField("label_above") else None,
         )
         for f in message.faces
+    )
+    regions = tuple(
+        RegionCertificate(r.label, r.simplices, r.components, r.euler_characteristic)
+        for r in message.regions
     )
     s = message.sharpest
     sharpest = None
@@ -333,7 +360,12 @@ def _certificate(message: pb.Certificate) -> Certificate:
         sharpest = WallAngle(tuple(s.walls), s.degrees, tuple(s.point))
     level = enums.level(message.level)
     return dataclasses.replace(
-        plain, level=level, violations=violations, faces=faces, sharpest=sharpest
+        plain,
+        level=level,
+        violations=violations,
+        faces=faces,
+        regions=regions,
+        sharpest=sharpest,
     )
 
 

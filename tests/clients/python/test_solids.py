@@ -1,12 +1,15 @@
 """Solids that are composed: which points are in them, which walls they have, what can be meshed."""
 
+import functools
 import itertools
+import operator
 import pickle
 
 import numpy as np
 import pytest
 import stellate
 from stellate import solids as s
+from stellate.solids._signs import needed
 
 norm = np.linalg.norm
 
@@ -137,7 +140,10 @@ def test_any_composition_is_the_boolean_of_its_parts(seed):
     try:
         half_walls = solid.half_walls()
     except ValueError as error:
-        assert any(why in str(error) for why in ("no intersection", "is empty", "all of space"))
+        assert any(
+            why in str(error)
+            for why in ("no intersection", "is empty", "all of space", "of more than 16")
+        )
     else:
         assert (np.all([wall(x) > 0 for wall in half_walls], axis=0) == want).all()
 
@@ -188,19 +194,50 @@ def test_walls_of_one_function_are_shared():
         (lambda: s.Ball() | s.Ball(at=(1, 0, 0)), "none has one sign"),
         (lambda: s.Ball() ^ s.Ball(at=(1, 0, 0)), "no intersection"),
         (lambda: s.Box([-1] * 3, [1] * 3) - s.Box([0] * 3, [2] * 3), "6 have one sign"),
-        (lambda: s.Ball() & s.Ball(at=(5, 0, 0)), "the solid is empty"),
-        (lambda: s.Ball() | ~s.Ball(), "all of space"),
     ],
 )
-def test_what_cannot_be_meshed_yet_says_what_can(composed, words):
+def test_what_is_no_intersection_has_labels_and_no_half_walls(composed, words):
     solid = composed()
     with pytest.raises(stellate.InvalidArgument, match=words) as refused:
         solid.half_walls()
-    if "intersection" in str(refused.value):
-        assert "blend" in str(refused.value) and isinstance(refused.value, ValueError)
+    assert isinstance(refused.value, ValueError) and "differences" in str(refused.value)
+    assert solid.labels.shape == (1 << solid.walls,) and set(solid.labels) == {0, 1}
+    x = np.random.default_rng(1).random((1000, 3)) * 4 - 2
+    signs = (solid.clearances(x) >= 0) @ (1 << np.arange(solid.walls))
+    assert (solid.labels[signs] == solid.contains(x)).all()
+
+
+@pytest.mark.parametrize(
+    "composed, words",
+    [
+        (lambda: s.Ball() & s.Ball(at=(5, 0, 0)), "the solid is empty"),
+        (lambda: s.Ball() | ~s.Ball(), "all of space"),
+        (
+            lambda: functools.reduce(
+                operator.or_, (s.Ball(1, at=(0.5 * i, 0, 0)) for i in range(17))
+            ),
+            "17 walls, and of more than 16",
+        ),
+    ],
+)
+def test_what_cannot_be_meshed_says_why(composed, words):
+    solid = composed()
     with pytest.raises(ValueError, match=words):
         stellate.mesh(solid, 0.1)  # before any server is looked for
     assert solid.contains(np.zeros((1, 3))).shape == (1,)
+
+
+def test_walls_that_tell_nothing_are_left_out():
+    # Of b: what no point can have tells nothing. Of c: labels are the same on both its sides.
+    labels = np.array([0, 1, -1, 1, 0, 1, 0, -1], dtype=np.int8)
+    walls, kept = needed(["a", "b", "c"], labels)
+    assert walls == ["a"] and kept.tolist() == [0, 1]
+    walls, kept = needed(["a", "b"], np.array([0, 1, 1, 1], dtype=np.int8))
+    assert walls == ["a", "b"] and kept.tolist() == [0, 1, 1, 1]
+
+
+def test_an_intersection_needs_no_labels():
+    assert (s.Box([-1] * 3, [1] * 3) - s.Ball()).labels is None
 
 
 @pytest.mark.parametrize(

@@ -96,6 +96,61 @@ def test_volumes(server, solid, epsilon, chi, size):
     assert size * 0.92 < volume(mesh) < size * 1.001  # chords of what is round
 
 
+@pytest.mark.parametrize(
+    "solid, epsilon, chi, size",
+    [
+        # Two balls of radius 1 whose centres are 1 apart have a lens of 5 pi / 12 in common.
+        (s.Ball() | s.Ball(at=(1, 0, 0)), 0.25, 1, np.pi * (8 / 3 - 5 / 12)),
+        (s.Ball() ^ s.Ball(at=(1, 0, 0)), 0.25, 2, np.pi * (8 / 3 - 10 / 12)),
+        (s.Box([-1] * 3, [1] * 3) - s.Box([0] * 3, [2] * 3), 0.4, 1, 7.0),
+        (s.Box([-1] * 3, [1] * 3) - s.Cylinder(0.5, 1, at=(0, 0, 1)), 0.25, 1, 8 - np.pi / 8),
+        (s.Box([-1, -1], [1, 1]) | s.Ball(0.6, at=(1.1, 0.1)), 0.2, 1, None),
+    ],
+    ids=["union", "symmetric-difference", "corner-cut-away", "blind-hole", "plane"],
+)
+def test_what_is_no_intersection_is_meshed_by_labels(server, solid, epsilon, chi, size):
+    mesh = stellate.mesh(solid, epsilon, server=server)
+    assert mesh.certified, mesh.report.certificate.verdict
+    assert mesh.report.certificate.euler_characteristic == chi
+    assert len(mesh.labels) == len(mesh.simplices) and set(mesh.labels) == {1}
+    if size is not None:
+        assert size * 0.92 < volume(mesh) < size * 1.02
+    # A vertex is inside, or on the walls that it is said to be on; and it never lies outside.
+    values = solid.clearances(mesh.points)
+    on = (mesh.walls[:, None] >> np.arange(solid.walls, dtype=np.uint64) & 1).astype(bool)
+    assert np.abs(values[on]).max() < 1e-9
+    assert solid.contains(mesh.points[~on.any(axis=1)]).all()
+
+
+def test_materials_are_regions(server):
+    # A ball in a block: 2 in the ball, 1 around it.
+    walls = [lambda x, i=i, up=up: 1 - up * x[:, i] for i in range(3) for up in (1.0, -1.0)]
+    ball = lambda x: 0.36 - (x**2).sum(axis=1)  # noqa: E731
+    signs = np.arange(1 << 7)
+    labels = np.where(signs % 64 < 63, 0, np.where(signs >= 64, 2, 1))
+    block = oracles.Solid([*walls, ball], ([-1.2] * 3, [1.2] * 3), labels=labels)
+    mesh = stellate.mesh(block, 0.25, server=server)
+    assert mesh.certified, mesh.report.certificate.verdict
+    around, inside = mesh.report.certificate.regions
+    assert (around.label, around.euler_characteristic) == (1, 2)
+    assert (inside.label, inside.euler_characteristic) == (2, 1)
+    assert "label 2: 1 component of Euler characteristic 1" in mesh.report.certificate.verdict
+    shell, core = mesh.region(1), mesh.region(2)
+    assert len(shell.simplices) + len(core.simplices) == len(mesh.simplices)
+    assert [face.walls for face in core.boundary] == [(6,)]
+    same = {tuple(row) for row in core.boundary[0].simplices.tolist()}
+    assert same == {
+        tuple(row)
+        for face in shell.boundary
+        if face.walls == (6,)
+        for row in face.simplices.tolist()
+    }
+    assert volume(core) == pytest.approx(4 / 3 * np.pi * 0.216, rel=0.1)
+    assert volume(shell) + volume(core) == pytest.approx(8)
+    with pytest.raises(ValueError, match=r"no region 3; it has \[1, 2\]"):
+        mesh.region(3)
+
+
 def test_a_smooth_union_is_one_wall(server):
     mesh = stellate.mesh(s.blend(s.Ball(0.6), s.Ball(0.5, at=(0.8, 0, 0)), 0.2), 0.1, server=server)
     hold(mesh, 1, 1)

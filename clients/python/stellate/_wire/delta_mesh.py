@@ -77,6 +77,38 @@ def spread_walls(boundary: list[tuple[np.ndarray, np.ndarray]], vertices: int) -
     return walls
 
 
+def labels_from_wire(labels: bytes, rows: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """What a message says of the regions of simplices: none or one pair of arrays.
+
+    Raises: ValueError if there are not that many simplices.
+    """
+    if not labels:
+        return []
+    if len(labels) != len(rows):
+        raise ValueError(f"{len(labels)} labels do not fit {len(rows)} simplices")
+    return [(rows, np.frombuffer(labels, dtype=np.int8))]
+
+
+def spread_labels(
+    labels: list[tuple[np.ndarray, np.ndarray]], rows: np.ndarray
+) -> np.ndarray | None:
+    """(m,) int8 of these rows, from what labels_from_wire found; None where there was nothing.
+
+    Raises: ValueError if there is none for one of them.
+    """
+    if not labels:
+        return None
+    known = np.concatenate([some for some, _ in labels])
+    keys = _keys(np.concatenate([rows, known]))
+    keys, known_keys = keys[: len(rows)], keys[len(rows) :]
+    order = np.argsort(known_keys, kind="stable")
+    # The last of those that came and went, and came again.
+    last = np.searchsorted(known_keys[order], keys, side="right") - 1
+    if len(rows) and not (known_keys[order[last]] == keys).all():
+        raise ValueError("a simplex has no label, and others have one")
+    return np.concatenate([of for _, of in labels])[order[last]]
+
+
 class DeltaMesh:
     """Vertices and simplices as of the last complete revision.
 
@@ -91,6 +123,7 @@ class DeltaMesh:
         self.revision = 0
         self._vertex_count = 0
         self._boundary: list[tuple[np.ndarray, np.ndarray]] = []  # vertices and their walls
+        self._labels: list[tuple[np.ndarray, np.ndarray]] = []  # simplices and their regions
         self._points = np.empty((1024, self._d))
         self._rows = np.empty((0, self._k + 1), dtype=np.uint32)  # in lexicographic order
         self._added: list[np.ndarray] = []
@@ -126,6 +159,8 @@ class DeltaMesh:
                 raise ValueError(
                     f"a simplex has vertex {int(rows.max())} of {self._vertex_count} vertices"
                 )
+        for rows, delta in zip(added, pending):
+            self._labels += labels_from_wire(delta.added_labels, rows)
         self._added += [rows for rows in added if len(rows)]
         self._removed += [rows for rows in removed if len(rows)]
         self._removed_count += sum(map(len, removed))
@@ -167,6 +202,11 @@ class DeltaMesh:
     def walls(self) -> np.ndarray | None:
         """(n,) uint64, the walls of each vertex as bits; None where there are none."""
         return spread_walls(self._boundary, self._vertex_count)
+
+    def labels(self) -> np.ndarray | None:
+        """(m,) int8, the region of each of the simplices(); None where there are none."""
+        self.settle()
+        return spread_labels(self._labels, self._rows)
 
     def simplices(self) -> np.ndarray:
         """(m, k+1) int64, ids ascending in each row, rows in lexicographic order."""

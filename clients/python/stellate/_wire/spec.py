@@ -49,6 +49,7 @@ def mesh_spec(oracle: CheckedOracle, epsilon: float, options: Mapping[str, Any])
     spec.oracle.conormals = oracle.walls > 0
     spec.oracle.about = oracle.about
     _set(spec, "walls", oracle.walls)
+    spec.labels = oracle.labels
     if oracle.bounding_box is not None:
         lower, upper = oracle.bounding_box
         spec.bounding_box.lower.CopyFrom(to_wire(lower))

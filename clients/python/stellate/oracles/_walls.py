@@ -60,6 +60,8 @@ class Clipped:
         infinite side is none.
       ball: (centre (d,), radius): M within a ball.
       seeds: (s, d) points near what is left, where M's box or seeds are not to be gone by.
+      labels: (2^walls,): the part of M with labels other than 0 instead of what is positive, region by
+        region; see Oracle.labels. Walls have to cross at an angle only where labels differ.
     """
 
     def __init__(
@@ -71,10 +73,16 @@ class Clipped:
         box: Sequence[Any] | None = None,
         ball: Sequence[Any] | None = None,
         seeds: Any = None,
+        labels: Any = None,
     ) -> None:
         self._walls: list[UserFunction] = []
         self._gradients: list[UserFunction | None] = []
+        self.labels = None if labels is None else np.array(labels)
         if isinstance(oracle, Clipped):
+            if oracle.labels is not None:
+                raise InvalidArgument(
+                    "what has labels cannot be clipped: give all walls to one Clipped"
+                )
             self._walls += oracle._walls
             self._gradients += oracle._gradients
             seeds = getattr(oracle, "seeds", None) if seeds is None else seeds
@@ -255,7 +263,7 @@ class Solid(Clipped):
     Args:
       walls: a function (n, d) -> (n,), or several.
       bounding_box: (lower (d,), upper (d,)) around it; by default that of a finite box or a ball.
-      gradients, box, ball, seeds: as in Clipped.
+      gradients, box, ball, seeds, labels: as in Clipped.
     """
 
     def __init__(
@@ -267,13 +275,20 @@ class Solid(Clipped):
         box: Sequence[Any] | None = None,
         ball: Sequence[Any] | None = None,
         seeds: Any = None,
+        labels: Any = None,
     ) -> None:
         several = [walls] if callable(walls) else walls
         slopes = [gradients] if callable(gradients) else gradients
         if bounding_box is None:
             bounding_box = _around(box, ball)
         super().__init__(
-            Space(bounding_box), several, gradients=slopes, box=box, ball=ball, seeds=seeds
+            Space(bounding_box),
+            several,
+            gradients=slopes,
+            box=box,
+            ball=ball,
+            seeds=seeds,
+            labels=labels,
         )
         self.thread_safe = False
 

@@ -123,6 +123,10 @@ def _pushed_in(node: Node) -> Node:
     return All(())  # which is not known to end anywhere
 
 
+class NoIntersection(InvalidArgument):
+    """A solid that is not all points on given sides of its walls."""
+
+
 class Arrangement:
     """A tree's walls, each once, and the labels of their sign vectors."""
 
@@ -198,14 +202,15 @@ class Arrangement:
     def literals(self) -> list[Literal]:
         """The signs that all of the inside has, and nothing else; as few as will do.
 
-        Raises: InvalidArgument, where that is not all there is to say of the inside: `why_not`.
+        Raises: NoIntersection, where that is not all there is to say of the inside; InvalidArgument.
         """
         conjunction = self._conjunction(self.tree)
         if len(self.walls) > MOST_IN_TABLES:
             if conjunction is None:
-                raise why_not(
-                    f"it has {len(self.walls)} walls, and of more than {MOST_IN_TABLES} only what is "
-                    "written as an intersection of half-walls is known for one"
+                raise InvalidArgument(
+                    f"the solid has {len(self.walls)} walls, and of more than {MOST_IN_TABLES} only what "
+                    "is written as an intersection of half-walls can be meshed: `a & b`, or `a - b` for "
+                    "a `b` of one wall"
                 )
             return sorted(conjunction)
         labels = self.labels()
@@ -279,13 +284,26 @@ class Arrangement:
                         yield [*sorted(body), literal]
 
 
-def why_not(what: str) -> InvalidArgument:
-    """The one place that says which solids a server can mesh."""
-    return InvalidArgument(
-        f"the solid is no intersection of half-walls, and only these can be meshed: {what}. What can "
-        "be meshed are intersections (&), differences from which a single wall is taken, as of a "
-        "cylinder that goes through, or walls that do not matter there, and smooth unions of two "
-        "single walls: blend(a, b, radius)"
+def needed(walls: list[Wall], labels: Labels) -> tuple[list[Wall], Labels]:
+    """The walls, and labels of their signs, without those whose sign tells nothing.
+
+    A wall tells nothing if no two points that differ in its sign alone have different labels. Of
+    those that formulas choose their branches by, most do not.
+    """
+    kept = list(walls)
+    for i in reversed(range(len(walls))):
+        below, above = np.moveaxis(labels.reshape(-1, 2, 1 << i), 1, 0)
+        if ((below == above) | (below < 0) | (above < 0)).all():
+            labels = np.maximum(below, above).ravel()
+            del kept[i]
+    return kept, labels
+
+
+def why_not(what: str) -> NoIntersection:
+    return NoIntersection(
+        f"the solid is no intersection of half-walls: {what}. It can be meshed; what has half-walls, to "
+        "cut another manifold by, are intersections (&), and differences from which a single wall is "
+        "taken, as of a cylinder that goes through"
     )
 
 

@@ -18,8 +18,10 @@ from ._signs import (
     Half,
     Labels,
     Node,
+    NoIntersection,
     Not,
     check_count,
+    needed,
     simplified,
     support,
 )
@@ -37,9 +39,9 @@ class Solid:
     `a & b` is the intersection, `a | b` the union, `a - b` the difference, `a ^ b` what is in one of the
     two, `~a` the complement. Walls that are the same in several parts are one.
 
-    Today's servers mesh what is an intersection of half-walls, once what does not matter is left out;
-    `half_walls` says whether a solid is one, and of which. Others can be composed, asked (`contains`) and
-    transformed.
+    What is an intersection of half-walls, once what does not matter is left out, is meshed by these
+    alone; `half_walls` says whether a solid is one, and of which. Of others all walls count, with a
+    label for each vector of their signs (`label_table`): 16 at most.
 
     Attributes:
       ambient_dimension: d, and `dimension` the same.
@@ -180,11 +182,21 @@ class Solid:
 
     @functools.cached_property
     def _oracle(self) -> WalledSolid:
-        return WalledSolid(self.half_walls(), self.bounding_box)
+        try:
+            return WalledSolid(self.half_walls(), self.bounding_box)
+        except NoIntersection:
+            walls, labels = needed(*self.label_table())
+        # Signs that no point has count as outside, of which nothing is seen.
+        return WalledSolid(walls, self.bounding_box, labels=np.maximum(labels, 0))
 
     @property
     def walls(self) -> int:
         return self._oracle.walls
+
+    @property
+    def labels(self) -> Labels | None:
+        """Of the vectors of the walls' signs; None where the solid is all that is positive."""
+        return self._oracle.labels
 
     def closest_point(self, points: Array) -> Array:
         """(n, d) -> (n, d): the points themselves, as of all of space."""
