@@ -129,15 +129,16 @@ int CountBad(const Stars<K>& stars, const double* point,
   for (const auto& [p, sector, cell] : tentative.cut)
     survey(p, sector, stars.sample().Point(p), cell);
   // Counts simplices that a cut star loses and an uncut one keeps.
-  for (const auto& [p, sector, cell] : tentative.cut) {
+  for (const auto& cut : tentative.cut) {
+    const std::uint32_t p = cut.star;
     Simplex simplex;
-    const Cell& before = stars.cell(p, sector);
+    const Cell& before = stars.cell(p, cut.sector);
     for (std::size_t v = 0; v < before.vertex_count(); ++v) {
       if (bad >= enough) return bad;
       if (!stars.SimplexOf(p, before, v, &simplex)) continue;
       const std::uint64_t key = SimplexKey<K>(before, v, p);
-      if (FindSimplex<K>(cell, p, simplex, key)) continue;
-      const std::uint64_t piece = with.PieceAt(p, sector, before, v);
+      if (FindSimplex<K>(cut.cell, p, simplex, key)) continue;
+      const std::uint64_t piece = with.PieceAt(p, cut.sector, before, v);
       bad += std::any_of(simplex.begin(), simplex.end(), [&](std::uint32_t q) {
         return q != p && !with.IsChanged(q) && HasSimplex<K>(stars, q, key, piece);
       });
