@@ -3,7 +3,6 @@
 #include <cmath>
 #include <functional>
 #include <numeric>
-#include <span>
 
 #include "core/base/parallel.h"
 #include "core/base/parallel_sort.h"
@@ -78,10 +77,12 @@ std::vector<std::uint32_t> Stars<K>::Simplices() const {
   return ParallelGather<std::uint32_t>(cells_.size(), [&](std::size_t p, auto* all) {
     thread_local std::vector<Simplex> owned;
     owned.clear();
-    for (int sector = 0; sector < sample_.sectors().Count(static_cast<std::uint32_t>(p)); ++sector)
+    const int sectors = sample_.sectors().Count(static_cast<std::uint32_t>(p));
+    for (int sector = 0; sector < sectors; ++sector)
       ForEachOwned(static_cast<std::uint32_t>(p), sector,
                    [&](std::size_t, const Simplex& s) { owned.push_back(s); });
     std::sort(owned.begin(), owned.end());
+    if (sectors > 1) owned.erase(std::unique(owned.begin(), owned.end()), owned.end());
     for (const Simplex& s : owned) AppendTo(all, s);
   });
 }
@@ -323,6 +324,44 @@ std::vector<typename Stars<K>::Turn> Stars<K>::InTurns(const std::vector<StarCut
   return turns;
 }
 
+// Returns the simplices whose lowest vertex is p, once each, with the label that LabelsOf gives
+// them: a point may have one in several sectors as long as stars disagree about it.
+template <int K>
+std::vector<std::pair<typename Stars<K>::Simplex, int>> Stars<K>::OwnedInSectors(
+    std::uint32_t p) const {
+  std::vector<std::pair<Simplex, int>> owned;
+  for (int sector = sample_.sectors().Count(p) - 1; sector >= 0; --sector)
+    ForEachOwned(p, sector, [&](std::size_t, const Simplex& s) {
+      owned.emplace_back(s, sample_.sectors().Label(p, sector));
+    });
+  const auto same = [](const auto& a, const auto& b) { return a.first == b.first; };
+  std::stable_sort(owned.begin(), owned.end(),
+                   [](const auto& a, const auto& b) { return a.first < b.first; });
+  owned.erase(std::unique(owned.begin(), owned.end(), same), owned.end());
+  return owned;
+}
+
+// Clips a star of several sectors, and returns its influence. A simplex whose label changes goes
+// and comes back.
+template <int K>
+double Stars<K>::CutSectors(std::uint32_t p, std::span<const StarCut> cuts,
+                            std::vector<std::uint32_t>* added,
+                            std::vector<std::uint32_t>* removed) {
+  const auto before = OwnedInSectors(p);
+  double influence = 0;
+  for (int sector = 0; sector < sample_.sectors().Count(p); ++sector) {
+    Cell& cell = MutableCell(p, sector);
+    builder().Cut(sample_.At(p, sector), cuts, cells_, &cell);
+    influence = std::max(influence, builder().Influence(p, cell));
+  }
+  const auto after = OwnedInSectors(p);
+  for (const auto& entry : before)
+    if (!std::binary_search(after.begin(), after.end(), entry)) AppendTo(removed, entry.first);
+  for (const auto& entry : after)
+    if (!std::binary_search(before.begin(), before.end(), entry)) AppendTo(added, entry.first);
+  return influence;
+}
+
 // Clips the old stars. A simplex that a cut creates has the new point as a vertex, whose id is
 // `first` or more; any other simplex was there before.
 template <int K>
@@ -345,35 +384,38 @@ void Stars<K>::CutStars(const std::vector<Turn>& turns, const std::vector<StarCu
     };
     for (std::size_t i = begin; i < end && !IsInterrupted(); ++i) {
       const std::uint32_t p = turns[i].star;
-      for (int sector = 0; sector < sample_.sectors().Count(p); ++sector) {
-        Cell& cell = MutableCell(p, sector);
-        before.clear();
-        ForEachOwned(p, sector, [&](std::size_t v, const Simplex& s) {
-          before.push_back({key_of(cell, v), s});
-        });
-        builder.Cut(sample_.At(p, sector),
-                    std::span(cuts).subspan(turns[i].begin, turns[i].end - turns[i].begin), cells_,
-                    &cell);
-        for (const auto& [key, s] : before)
-          if (!is_left(cell, key, s)) AppendTo(&removed[chunk], s);
-        ForEachOwned(p, sector, [&](std::size_t, const Simplex& s) {
-          if (s.back() >= first) AppendTo(&added[chunk], s);
-        });
-        influence[i] = std::max(influence[i], builder.Influence(p, cell));
+      const auto own_cuts = std::span(cuts).subspan(turns[i].begin, turns[i].end - turns[i].begin);
+      if (sample_.sectors().Count(p) > 1) {
+        influence[i] = CutSectors(p, own_cuts, &added[chunk], &removed[chunk]);
+        continue;
       }
+      Cell& cell = cells_[p];
+      before.clear();
+      ForEachOwned(p, 0, [&](std::size_t v, const Simplex& s) {
+        before.push_back({key_of(cell, v), s});
+      });
+      builder.Cut(sample_.At(p), own_cuts, cells_, &cell);
+      for (const auto& [key, s] : before)
+        if (!is_left(cell, key, s)) AppendTo(&removed[chunk], s);
+      ForEachOwned(p, 0, [&](std::size_t, const Simplex& s) {
+        if (s.back() >= first) AppendTo(&added[chunk], s);
+      });
+      influence[i] = builder.Influence(p, cell);
     }
   });
   // A new point has the largest id of its simplices, except of those among new points alone.
   ParallelChunks(count, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
       const std::uint32_t p = first + static_cast<std::uint32_t>(i);
-      for (int sector = 0; sector < sample_.sectors().Count(p); ++sector) {
-        ForEachOwned(p, sector, [&](std::size_t, const Simplex& s) {
-          AppendTo(&added[removed.size() + chunk], s);
-        });
-        double& reach = influence[turns.size() + i];
+      std::vector<std::uint32_t>* const own = &added[removed.size() + chunk];
+      double& reach = influence[turns.size() + i];
+      const int sectors = sample_.sectors().Count(p);
+      for (int sector = 0; sector < sectors; ++sector)
         reach = std::max(reach, builder.Influence(p, cell(p, sector)));
-      }
+      if (sectors == 1)
+        ForEachOwned(p, 0, [&](std::size_t, const Simplex& s) { AppendTo(own, s); });
+      else
+        for (const auto& entry : OwnedInSectors(p)) AppendTo(own, entry.first);
     }
   });
   SetInfluences(turns, first, influence);

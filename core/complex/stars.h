@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -195,6 +196,9 @@ class Stars {
   void MeasureFaces(const std::vector<Turn>& turns, std::uint32_t first);
   void NoteSectors(std::uint32_t id);
   Cell& MutableCell(std::uint32_t id, int sector);
+  std::vector<std::pair<Simplex, int>> OwnedInSectors(std::uint32_t p) const;
+  double CutSectors(std::uint32_t p, std::span<const StarCut> cuts,
+                    std::vector<std::uint32_t>* added, std::vector<std::uint32_t>* removed);
   bool IsCutBy(const StarBuilder<K>& builder, std::uint32_t p, const Site& q) const;
   void FindClosing(const double* q, std::uint32_t near, std::vector<std::uint32_t>* ids) const;
   template <typename Visit>
