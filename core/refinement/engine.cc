@@ -106,7 +106,9 @@ std::vector<Target<K>> Engine<K>::SizeAndShapeTargets() const {
   };
   std::vector<std::uint8_t> is_target(entries.size());
   ParallelFor(entries.size(), [&](std::size_t i) {
-    is_target[i] = !violations_.is_given_up(entries[i].star) && !is_seen_from_lower(entries[i]);
+    const auto& [star, violation] = entries[i];
+    is_target[i] = !violations_.is_given_up(star) && !is_seen_from_lower(entries[i]) &&
+                   !IsLeftAlone<K>(stars_, violation, sizes_.BoundAt(stars_, star));
   });
   std::vector<Target<K>> targets;
   targets.reserve(static_cast<std::size_t>(std::count(is_target.begin(), is_target.end(), 1)));
@@ -173,7 +175,8 @@ std::vector<Target<K>> Engine<K>::GoodPointTargets() {
       continue;
     }
     violations_.NoteJudged(p, found[i]->rule);
-    if (violations_.is_given_up(p)) continue;
+    if (violations_.is_given_up(p) || IsLeftAlone<K>(stars_, *found[i], sizes_.BoundAt(stars_, p)))
+      continue;
     const auto split = face_splits.Under(p, *found[i]);
     targets.push_back(split ? *split : TargetOf(p, *found[i]));
   }

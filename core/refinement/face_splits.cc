@@ -9,10 +9,6 @@
 namespace stellate::core {
 namespace {
 
-// R2 and R3 never split a boundary simplex below this share of the size bound. With a larger share
-// shapes are bad where faces are near each other: of 63 gyroid solids that end just beside the
-// corners of their boxes 12 do not close with this, 25 with 0.05, more than half with 0.25.
-constexpr double kLeastSplit = 0.02;
 // On a curved edge the radius of a shell may be a little larger than it was set.
 constexpr double kShellLength = 1.1;
 

@@ -10,6 +10,19 @@
 
 namespace stellate::core {
 
+// R2 and R3 never split a boundary simplex below this share of the size bound. With a larger share
+// shapes are bad where faces are near each other: of 63 gyroid solids that end just beside the
+// corners of their boxes 12 do not close with this, 25 with 0.05, more than half with 0.25.
+inline constexpr double kLeastSplit = 0.02;
+
+// Whether a simplex of a wall of an arrangement breaks a rule and is left, for it is so small:
+// where walls touch, each would cut the other's simplices without end.
+template <int K>
+bool IsLeftAlone(const Stars<K>& stars, const Violation<K>& violation, double size_bound) {
+  return !stars.sample().sectors().labels().empty() && violation.walls != 0 &&
+         violation.rule > Rule::kSize && violation.radius < kLeastSplit * size_bound;
+}
+
 // Decides where faces are split for the sake of others: an insertion yields to faces of lower
 // dimension, as in Ruppert's refinement.
 template <int K>

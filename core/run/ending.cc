@@ -17,6 +17,7 @@
 #include "core/certificate/findings.h"
 #include "core/complex/consistency.h"
 #include "core/geometry/reach_bound.h"
+#include "core/refinement/face_splits.h"
 
 namespace stellate::core {
 namespace {
@@ -232,8 +233,33 @@ std::string AboutLeftFaces(const Engine<K>& engine) {
       ", and the rest was meshed without them; ");
 }
 
+// Describes where walls of an arrangement come so near each other that they may touch; or empty.
+template <int K>
+std::string WhereWallsTouch(const Engine<K>& engine) {
+  const Stars<K>& stars = engine.stars();
+  for (const std::uint32_t p : stars.sample().boundary()) {
+    CheckInterruption(p);
+    const double bound = engine.sizes().BoundAt(stars, p);
+    const auto worst =
+        WorstSizeOrShape<K>(stars, p, bound, engine.criteria().radius_edge_bound, K - 1);
+    if (!worst || !IsLeftAlone<K>(stars, *worst, bound)) continue;
+    const auto simplex = stars.FaceSimplexOf(p, stars.cell(p, worst->sector), worst->vertex);
+    WallSet others = 0;
+    for (int i = 0; i < simplex.count; ++i)
+      others |= stars.sample().walls(simplex.ids[static_cast<std::size_t>(i)]) & ~simplex.walls;
+    if (!simplex.foreign || others == 0) continue;
+    return Message(
+        "walls ", ListWalls(simplex.walls | others), " come so near each other near ",
+        NamePoint(Eigen::Map<const Eigen::VectorXd>(stars.sample().Point(p), stars.sample().d())),
+        " that they may touch there: move one of them, so that they cross at an angle or stay "
+        "apart by more than a fiftieth of epsilon");
+  }
+  return "";
+}
+
 template <int K>
 std::string WhatIsLeft(const Engine<K>& engine, std::uint64_t inconsistent) {
+  if (std::string touching = WhereWallsTouch<K>(engine); !touching.empty()) return touching;
   const Stars<K>& stars = engine.stars();
   const auto& entries = engine.violations().size_and_shape();
   const auto place = [&](std::uint32_t v) {

@@ -202,6 +202,54 @@ TEST(Arrangements, AWallThatNoLabelDependsOnIsNoConcern) {
   EXPECT_NEAR(Volume(*mesh, mesh->regions.at(1)), 3.14159, 0.1);
 }
 
+// Two balls that nearly touch: each wall would cut the other's simplices without end.
+TEST(Arrangements, WallsThatNearlyTouchAreNamed) {
+  Arrangement touching = testing::SpaceArrangements()[0];
+  touching.domain.walls = {testing::InBall(Eigen::Vector3d(-1.0002, 0, 0), 1),
+                           testing::InBall(Eigen::Vector3d(1.0002, 0, 0), 1)};
+  touching.domain.box = testing::CubeOf(3, 2.2);
+  Specification spec = touching.SpecificationFor(0.4);
+  spec.limits.max_vertices = 20000;
+  const auto mesh = MeshOf(touching.domain, spec);
+  ASSERT_TRUE(mesh) << mesh.error().message;
+  const Report& report = mesh->report;
+  EXPECT_FALSE(report.certificate.certified);
+  EXPECT_EQ(report.termination, Termination::kNoProgress) << report.counts.vertices;
+  EXPECT_NE(report.certificate.verdict.find("walls 0, 1 come so near each other near ("),
+            std::string::npos)
+      << report.certificate.verdict;
+  EXPECT_EQ(report.certificate.verdict.find("smaller epsilon"), std::string::npos);
+}
+
+// Changes add up to the mesh also while stars disagree about labels.
+TEST(Arrangements, ChangesAddUpToTheMesh) {
+  for (const Arrangement& a : {testing::SpaceArrangements()[5], testing::PlaneArrangements()[2]}) {
+    const Specification spec = a.SpecificationFor(a.epsilon);
+    auto created = Mesher::Create(spec);
+    ASSERT_TRUE(created);
+    Mesher& mesher = **created;
+    Domain domain = a.domain;
+    std::map<std::vector<std::uint32_t>, int> labels;
+    const auto width = static_cast<std::size_t>(spec.dimension) + 1;
+    const auto row = [&](const std::vector<std::uint32_t>& all, std::size_t s) {
+      return std::vector<std::uint32_t>(all.begin() + static_cast<std::ptrdiff_t>(s * width),
+                                        all.begin() + static_cast<std::ptrdiff_t>((s + 1) * width));
+    };
+    while (const auto batch = mesher.NextBatch()) {
+      const auto delta = mesher.Absorb(domain.AnswersOf(*batch));
+      ASSERT_TRUE(delta);
+      for (std::size_t s = 0; s * width < delta->removed.size(); ++s)
+        ASSERT_EQ(labels.erase(row(delta->removed, s)), 1u) << a.name << ' ' << delta->revision;
+      for (std::size_t s = 0; s * width < delta->added.size(); ++s)
+        ASSERT_TRUE(labels.emplace(row(delta->added, s), delta->labels[s]).second) << a.name;
+      const std::vector<std::uint32_t> all = mesher.Simplices();
+      const std::vector<std::int8_t> now = mesher.Labels();
+      ASSERT_EQ(all.size() / width, labels.size()) << a.name << ' ' << delta->revision;
+      for (std::size_t s = 0; s < now.size(); ++s) ASSERT_EQ(labels[row(all, s)], now[s]);
+    }
+  }
+}
+
 // The same mesh, bit for bit, for any number of threads.
 TEST(Arrangements, DoNotDependOnThreads) {
   const Arrangement venn = testing::SpaceArrangements()[1];
