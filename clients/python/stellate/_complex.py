@@ -23,6 +23,9 @@ class Complex(Protocol):
     def walls(self) -> np.ndarray | None: ...
 
     @property
+    def labels(self) -> np.ndarray | None: ...
+
+    @property
     def report(self) -> Report | None: ...
 
     @property

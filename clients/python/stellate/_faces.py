@@ -25,16 +25,21 @@ class Face:
         return f"<stellate.Face of walls {walls}: {len(self.simplices)} simplices>"
 
 
-def faces(simplices: np.ndarray, walls: np.ndarray | None, dimension: int) -> tuple[Face, ...]:
+def faces(
+    simplices: np.ndarray,
+    walls: np.ndarray | None,
+    dimension: int,
+    labels: np.ndarray | None = None,
+) -> tuple[Face, ...]:
     """What bounds the complex, by walls: facets in one simplex alone, and what these have in common.
 
     `walls`: (n,) bits, or None. Faces of a dimension below that of the facets lie on more walls than
-    the facets around them do.
+    the facets around them do. `labels`: (m,), or None: then facets between two regions bound, too.
     """
     k = simplices.shape[1] - 1
     if walls is None or not 0 <= dimension < k or not len(simplices):
         return ()
-    rows = facets_in_one(simplices)
+    rows = facets_in_one(simplices) if labels is None else facets_of_regions(simplices, labels)
     bits = np.bitwise_and.reduce(walls[rows], axis=1)
     while rows.shape[1] - 1 > dimension and len(rows):
         rows, bits = _ridges(rows, walls)
@@ -57,6 +62,17 @@ def facets_in_one(simplices: np.ndarray) -> np.ndarray:
     """The facets in one simplex alone, in lexicographic order."""
     facets, counts = np.unique(_subsets(simplices), axis=0, return_counts=True)
     return facets[counts == 1]
+
+
+def facets_of_regions(simplices: np.ndarray, labels: np.ndarray) -> np.ndarray:
+    """The facets that are not in two simplices with one label, in lexicographic order."""
+    facets, at = np.unique(_subsets(simplices), axis=0, return_inverse=True)
+    of = np.tile(labels, simplices.shape[1]).astype(np.int64)
+    counts = np.bincount(at.ravel(), minlength=len(facets))
+    least, most = np.full(len(facets), 128), np.full(len(facets), -1)
+    np.minimum.at(least, at.ravel(), of)
+    np.maximum.at(most, at.ravel(), of)
+    return facets[(counts == 1) | (least != most)]
 
 
 def _ridges(rows: np.ndarray, walls: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

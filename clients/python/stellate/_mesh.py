@@ -60,7 +60,7 @@ class Mesh:
     @property
     def boundary(self) -> tuple[Face, ...]:
         """The boundary's parts, one for each wall: simplices of dimension k - 1."""
-        return self.faces(self.dimension - 1)
+        return _faces.faces(self.simplices, self.walls, self.dimension - 1)
 
     @property
     def edges(self) -> tuple[Face, ...]:
@@ -73,8 +73,9 @@ class Mesh:
         return tuple(face for face in self.faces(0) if len(face.walls) >= self.dimension)
 
     def faces(self, dimension: int) -> tuple[Face, ...]:
-        """The faces of a dimension below k, of a manifold with boundary, by ascending walls."""
-        return _faces.faces(self.simplices, self.walls, dimension)
+        """The faces of a dimension below k, of a manifold with boundary, by ascending walls; those
+        between regions, too."""
+        return _faces.faces(self.simplices, self.walls, dimension, self.labels)
 
     @property
     def dimension(self) -> int:
@@ -132,9 +133,11 @@ class Mesh:
         .mesh .meshb .nas .post .su2 .tec .vol .xdmf .xmf .xml, d <= 3, by meshio.
 
         Of a mesh with boundary .msh, .vtu, .vtk and .obj have its faces too, of all dimensions, after
-        its simplices: in .msh as physical groups, "inside", "wall_0", ..., "walls_0_1", ...; in .obj
+        its simplices: in .msh as physical groups, "inside", or "region_1" for label 1 where there are
+        several, "wall_0", ..., "walls_0_1", ...; in .obj
         as groups of the same names; in .vtu and .vtk with the cell data "walls", the walls as bits
-        (0 inside), and .vtu's "group", .msh's number of it. Points have "walls" too.
+        (0 inside), and .vtu's "group", .msh's number of it. Points have "walls" too. Faces between
+        regions are among them.
 
         Surfaces are written with their triangles turned to agree where they are orientable. A file
         that was there is replaced when the new one is whole.

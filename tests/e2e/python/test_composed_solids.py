@@ -3,6 +3,7 @@
 import concurrent.futures as futures
 import multiprocessing
 
+import meshio
 import numpy as np
 import pytest
 import stellate
@@ -122,7 +123,7 @@ def test_what_is_no_intersection_is_meshed_by_labels(server, solid, epsilon, chi
     assert solid.contains(mesh.points[~on.any(axis=1)]).all()
 
 
-def test_materials_are_regions(server):
+def test_materials_are_regions(server, tmp_path):
     # A ball in a block: 2 in the ball, 1 around it.
     walls = [lambda x, i=i, up=up: 1 - up * x[:, i] for i in range(3) for up in (1.0, -1.0)]
     ball = lambda x: 0.36 - (x**2).sum(axis=1)  # noqa: E731
@@ -149,6 +150,23 @@ def test_materials_are_regions(server):
     assert volume(shell) + volume(core) == pytest.approx(8)
     with pytest.raises(ValueError, match=r"no region 3; it has \[1, 2\]"):
         mesh.region(3)
+    # What is between the regions is a face, and not where the mesh ends.
+    assert [face.walls for face in mesh.boundary] == [(i,) for i in range(6)]
+    assert [face.walls for face in mesh.faces(2)] == [(i,) for i in range(7)]
+    mesh.save(tmp_path / "block.msh")
+    mesh.save(tmp_path / "block.vtu")
+    read = meshio.read(tmp_path / "block.msh")
+    tags = {name: tag for name, (tag, _) in read.field_data.items()}
+    assert {"region_1", "region_2", "wall_6"} <= set(tags) and "inside" not in tags
+    counted = {
+        name: sum(int((values == tag).sum()) for values in read.cell_data["gmsh:physical"])
+        for name, tag in tags.items()
+    }
+    assert counted["region_2"] == len(core.simplices)
+    assert counted["wall_6"] == len(core.boundary[0].simplices)
+    assert sum(len(block.data) for block in meshio.read(tmp_path / "block.vtu").cells) == sum(
+        counted.values()
+    )
 
 
 def test_a_smooth_union_is_one_wall(server):

@@ -11,11 +11,11 @@ from .._complex import Complex
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Group:
-    """Simplices of one dimension that lie on the same walls; on none: the mesh's own.
+    """Simplices of one dimension that lie on the same walls; on none: the mesh's own, or a region's.
 
     Attributes:
       tag: its number, from 1 on: the mesh's own first, then the boundary's, edges', corners'.
-      name: "inside", "wall_0", "walls_0_1", ...
+      name: "inside", or "region_1" of several regions; "wall_0", "walls_0_1", ...
       walls: their numbers, ascending.
       simplices: (m, j+1). The boundary's are turned as the mesh's own induce it: outwards, if
         the mesh fills space.
@@ -39,7 +39,13 @@ class Group:
 
 def groups(mesh: Complex, cells: np.ndarray) -> list[Group]:
     """All of a mesh with these cells, oriented or not: one group, where it has no boundary."""
+    labels = mesh.labels
     found = [Group(1, "inside", (), cells)]
+    if labels is not None and len(np.unique(labels)) > 1:
+        found = [
+            Group(number, f"region_{label}", (), cells[labels == label])
+            for number, label in enumerate(np.unique(labels).tolist(), 1)
+        ]
     for dimension in reversed(range(mesh.dimension)):
         for face in mesh.faces(dimension):
             rows = face.simplices
