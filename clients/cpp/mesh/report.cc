@@ -84,6 +84,10 @@ std::string ViolationsJson(const Violations& v) {
   return json.Take();
 }
 
+std::string LabelJson(const std::optional<std::uint32_t>& label) {
+  return label ? std::to_string(*label) : "null";
+}
+
 std::string FacesJson(const std::vector<FaceCertificate>& faces) {
   std::string text;
   for (const FaceCertificate& face : faces) {
@@ -93,6 +97,21 @@ std::string FacesJson(const std::vector<FaceCertificate>& faces) {
     json.Add("simplices", face.simplices);
     json.Add("components", face.components);
     json.Raw("euler_characteristic", std::to_string(face.euler_characteristic));
+    json.Raw("label_below", LabelJson(face.label_below));
+    json.Raw("label_above", LabelJson(face.label_above));
+    text += (text.empty() ? "" : ", ") + json.Take();
+  }
+  return "[" + text + "]";
+}
+
+std::string RegionsJson(const std::vector<RegionCertificate>& regions) {
+  std::string text;
+  for (const RegionCertificate& region : regions) {
+    JsonObject json;
+    json.Raw("label", std::to_string(region.label));
+    json.Add("simplices", region.simplices);
+    json.Add("components", region.components);
+    json.Raw("euler_characteristic", std::to_string(region.euler_characteristic));
     text += (text.empty() ? "" : ", ") + json.Take();
   }
   return "[" + text + "]";
@@ -150,6 +169,7 @@ std::string CertificateJson(const Certificate& c) {
   json.Raw("boundary_euler_characteristic", std::to_string(c.boundary_euler_characteristic));
   json.Raw("faces", FacesJson(c.faces));
   json.Raw("sharpest", SharpestJson(c.sharpest));
+  json.Raw("regions", RegionsJson(c.regions));
   json.Add("only_too_coarse", c.only_too_coarse);
   return json.Take();
 }

@@ -188,6 +188,10 @@ std::vector<std::uint32_t> Ids(const v1::IndexArray& array) {
   return ids;
 }
 
+std::optional<std::uint32_t> LabelOf(bool there, std::uint32_t label) {
+  return there ? std::optional(label) : std::nullopt;
+}
+
 Violations FromProto(const v1::Violations& m) {
   Violations v{{}, Ids(m.links()), Ids(m.stars()), Ids(m.inconsistent()), Ids(m.fibres())};
   const std::vector<std::uint32_t> ids = Ids(m.faces());
@@ -265,12 +269,17 @@ Report ReportOf(const v1::Mesh& mesh) {
                          face.dimension(),
                          face.simplices(),
                          face.components(),
-                         face.euler_characteristic()});
+                         face.euler_characteristic(),
+                         LabelOf(face.has_label_below(), face.label_below()),
+                         LabelOf(face.has_label_above(), face.label_above())});
   if (c.has_sharpest()) {
     const v1::WallAngle& s = c.sharpest();
     out.sharpest = WallAngle{
         {s.walls().begin(), s.walls().end()}, s.degrees(), {s.point().begin(), s.point().end()}};
   }
+  for (const v1::RegionCertificate& region : c.regions())
+    out.regions.push_back(
+        {region.label(), region.simplices(), region.components(), region.euler_characteristic()});
   out.only_too_coarse = c.only_too_coarse();
   return r;
 }

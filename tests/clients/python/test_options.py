@@ -46,6 +46,7 @@ class Everything:
     """An oracle that can all that there is a field for."""
 
     dimension, ambient_dimension, walls = 2, 3, 1
+    labels = [0, 1]
     bounding_box = [-1.0] * 3, [1.0] * 3
     seeds = np.ones((1, 3))
 

@@ -185,7 +185,7 @@ AS_JSON = (
     '"declared_reach": 0, "reach_refuted": false, "proved_distance": 0, "answers_checked": 0, '
     '"violations": {"faces": [[1, 2], [1, 5]], "links": [], "stars": [7], "inconsistent": [], '
     '"fibres": [0, 3]}, "boundary_simplices": 0, "boundary_components": 0, '
-    '"boundary_euler_characteristic": 0, "faces": [], "sharpest": null, '
+    '"boundary_euler_characteristic": 0, "faces": [], "sharpest": null, "regions": [], '
     '"only_too_coarse": false}, "elapsed_seconds": 0.5, '
     f'"version": "{stellate.__version__}"}}'
 )

@@ -77,6 +77,16 @@ struct FaceCertificate {
   std::uint64_t simplices = 0;
   std::uint64_t components = 0;
   std::int64_t euler_characteristic = 0;
+  // Of a wall of an arrangement: the labels where it is negative and where it is positive.
+  std::optional<std::uint32_t> label_below, label_above;
+};
+
+// A region of an arrangement of walls: the part of the mesh with one label.
+struct RegionCertificate {
+  std::uint32_t label = 0;
+  std::uint64_t simplices = 0;
+  std::uint64_t components = 0;
+  std::int64_t euler_characteristic = 0;
 };
 
 // Two walls that meet.
@@ -129,8 +139,9 @@ struct Certificate {
   std::uint64_t boundary_simplices = 0;  // of dimension k - 1
   std::uint64_t boundary_components = 0;
   std::int64_t boundary_euler_characteristic = 0;
-  std::vector<FaceCertificate> faces;  // by dimension, the lowest first
-  std::optional<WallAngle> sharpest;   // where walls meet at the smallest angle, if any meet
+  std::vector<FaceCertificate> faces;      // by dimension, the lowest first
+  std::optional<WallAngle> sharpest;       // where walls meet at the smallest angle, if any meet
+  std::vector<RegionCertificate> regions;  // of an arrangement of walls, by label
 
   // Refused for epsilon alone: no check contradicts the mesh, which is too coarse, compared with
   // the reach, to be certified.
