@@ -158,6 +158,8 @@ class Drawn(Saved, Declared):
         end = mesh_pb2.Mesh(name=self.mesh, state=mesh_pb2.MESH_STATE_SUCCEEDED)
         end.report.termination = mesh_pb2.TERMINATION_CONVERGED
         end.report.certificate.level = mesh_pb2.CERTIFICATE_LEVEL_SAMPLED
+        end.report.counts.vertices = len(mesh.points)
+        end.report.counts.simplices = len(mesh.simplices)
         yield pb.WatchMeshResponse(final=end)
         self.over.set()
 
