@@ -68,7 +68,7 @@ void RegionClaims::JudgeInside(const std::vector<std::uint32_t>& chosen, std::ui
     // A simplex at a wall may lie beyond that, by as much as the wall bends.
     WallSet touched = 0;
     for (int i = 0; i <= x_.mesh.k; ++i) touched |= x_.mesh.WallsOf(ids[i]);
-    const int label = x_.mesh.labels[chosen[n]];
+    const std::int8_t label = x_.mesh.labels[chosen[n]];
     for (std::size_t m = n * each; m < (n + 1) * each; ++m) {
       const auto j = static_cast<Eigen::Index>(m);
       if (!Found(answer, j)) continue;
@@ -76,7 +76,7 @@ void RegionClaims::JudgeInside(const std::vector<std::uint32_t>& chosen, std::ui
       if (MayBeIn(*x_.mesh.table, label, signs, touched)) continue;
       x_.findings.Refuse(
           Findings::kCoverage,
-          Message("simplex ", NameSimplex(ids, x_.mesh.k + 1), " has the label ", label,
+          Message("simplex ", NameSimplex(ids, x_.mesh.k + 1), " has the label ", +label,
                   ", and at ", NamePoint(answer.points.col(j)), " in it the walls' signs say ",
                   x_.mesh.table->Of(signs),
                   ": a part of that region is missing that is smaller than epsilon; take epsilon "
