@@ -29,6 +29,14 @@ def is_closed(simplices: np.ndarray) -> bool:
     return once and bool((count == 2).all())
 
 
+def rim(simplices: np.ndarray) -> np.ndarray:
+    """The facets in one simplex; no facet is in three."""
+    facets = np.concatenate([np.delete(simplices, i, axis=1) for i in range(simplices.shape[1])])
+    rows, counts = np.unique(facets, axis=0, return_counts=True)
+    assert counts.max() <= 2
+    return rows[counts == 1]
+
+
 def component_count(simplices: np.ndarray) -> int:
     parent = {int(v): int(v) for v in np.unique(simplices)}
 

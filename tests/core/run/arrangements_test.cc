@@ -97,16 +97,25 @@ std::map<int, double> VolumesByCounting(const Arrangement& a) {
   return volumes;
 }
 
-class ArrangementsTest : public ::testing::TestWithParam<std::tuple<Arrangement, unsigned>> {};
+class ArrangementsTest : public ::testing::TestWithParam<std::tuple<Arrangement, unsigned>> {
+ protected:
+  void SetUp() override {
+    const unsigned seed = std::get<1>(GetParam());
+    domain = arrangement.domain.Turned(seed);
+    spec = arrangement.SpecificationFor(arrangement.epsilon);
+    spec.bounding_box = BoundingBox{domain.box.lower, domain.box.upper};
+    spec.random_seed = seed + 1;
+    mesh = MeshOf(domain, spec);
+    ASSERT_TRUE(mesh) << mesh.error().message;
+  }
+
+  const Arrangement& arrangement = std::get<0>(GetParam());
+  Domain domain;
+  Specification spec;
+  Expected<LabelledMesh> mesh;
+};
 
 TEST_P(ArrangementsTest, AreMeshedRegionByRegion) {
-  const auto& [arrangement, seed] = GetParam();
-  const Domain domain = arrangement.domain.Turned(seed);
-  Specification spec = arrangement.SpecificationFor(arrangement.epsilon);
-  spec.bounding_box = BoundingBox{domain.box.lower, domain.box.upper};
-  spec.random_seed = seed + 1;
-  const auto mesh = MeshOf(domain, spec);
-  ASSERT_TRUE(mesh) << mesh.error().message;
   const Certificate& certificate = mesh->report.certificate;
   EXPECT_TRUE(certificate.certified) << certificate.verdict;
 
@@ -136,13 +145,6 @@ TEST_P(ArrangementsTest, AreMeshedRegionByRegion) {
 
 // Only simplices at a curved wall may have their barycentre beyond it.
 TEST_P(ArrangementsTest, HaveTheLabelsOfTheirPlaces) {
-  const auto& [arrangement, seed] = GetParam();
-  const Domain domain = arrangement.domain.Turned(seed);
-  Specification spec = arrangement.SpecificationFor(arrangement.epsilon);
-  spec.bounding_box = BoundingBox{domain.box.lower, domain.box.upper};
-  spec.random_seed = seed + 1;
-  const auto mesh = MeshOf(domain, spec);
-  ASSERT_TRUE(mesh) << mesh.error().message;
   for (const auto& [label, simplices] : mesh->regions)
     for (const auto& simplex : simplices) {
       const Eigen::VectorXd at = Barycentre(*mesh, simplex);

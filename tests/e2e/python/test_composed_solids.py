@@ -9,7 +9,7 @@ import pytest
 import stellate
 from stellate import executors, manifolds, oracles
 from stellate import solids as s
-from topology import component_count, euler_characteristic
+from topology import component_count, euler_characteristic, rim
 
 norm = np.linalg.norm
 _SPAWN = multiprocessing.get_context("spawn")
@@ -27,13 +27,6 @@ def thrown(inside, lower, upper, count=400_000):
     lower, upper = np.asarray(lower, float), np.asarray(upper, float)
     x = lower + np.random.default_rng(3).random((count, len(lower))) * (upper - lower)
     return inside(x).mean() * np.prod(upper - lower)
-
-
-def rim(simplices):
-    facets = np.concatenate([np.delete(simplices, i, axis=1) for i in range(simplices.shape[1])])
-    rows, counts = np.unique(facets, axis=0, return_counts=True)
-    assert counts.max() <= 2
-    return rows[counts == 1]
 
 
 def hold(mesh, chi, walls):

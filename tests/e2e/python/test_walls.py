@@ -1,38 +1,17 @@
 """Manifolds with boundary, clipped in Python; what the server makes of each kind: ../walls_test.cc."""
 
-import itertools
-
 import numpy as np
 import pytest
 import stellate
 from stellate import manifolds, oracles
-
-
-def euler(simplices):
-    """Of a complex, all its faces counted."""
-    k = simplices.shape[1] - 1
-    chi = 0
-    for j in range(k + 1):
-        faces = {
-            tuple(row[list(pick)])
-            for pick in itertools.combinations(range(k + 1), j + 1)
-            for row in simplices
-        }
-        chi += (-1) ** j * len(faces)
-    return chi
-
-
-def rim(simplices):
-    """The facets in one simplex; no facet is in three."""
-    facets = np.concatenate([np.delete(simplices, i, axis=1) for i in range(simplices.shape[1])])
-    rows, counts = np.unique(facets, axis=0, return_counts=True)
-    assert counts.max() <= 2
-    return rows[counts == 1]
+from topology import euler_characteristic, rim
 
 
 def hold(mesh, chi, walls):
     assert mesh.certified, mesh.report
-    assert euler(mesh.simplices) == chi == mesh.report.certificate.euler_characteristic
+    assert (
+        euler_characteristic(mesh.simplices) == chi == mesh.report.certificate.euler_characteristic
+    )
     boundary = np.concatenate([face.simplices for face in mesh.boundary])
     assert {face.walls for face in mesh.boundary} == walls
     assert sorted(map(tuple, boundary)) == sorted(map(tuple, rim(mesh.simplices)))
