@@ -26,6 +26,8 @@ const char* CertificateLevelName(CertificateLevel level) {
   switch (level) {
     case CertificateLevel::kRefused:
       return "REFUSED";
+    case CertificateLevel::kDecided:
+      return "DECIDED";
     case CertificateLevel::kSampled:
       return "SAMPLED";
     case CertificateLevel::kProved:

@@ -106,6 +106,8 @@ struct WallAngle {
 // How far a certificate goes.
 enum class CertificateLevel {
   kRefused = 0,  // a check failed, or the run did not converge
+  kDecided,      // of reconstructions: it is a manifold, but the points say too little of M; not
+                 // certified
   kSampled,      // every check passed; some look at samples
   kProved,       // and a theorem holds, of the declared reach alone
 };

@@ -36,6 +36,8 @@ v1::CertificateLevel ToProto(core::CertificateLevel level) {
   switch (level) {
     case core::CertificateLevel::kRefused:
       return v1::CERTIFICATE_LEVEL_REFUSED;
+    case core::CertificateLevel::kDecided:  // of reconstructions, which have no rpc yet
+      return v1::CERTIFICATE_LEVEL_UNSPECIFIED;
     case core::CertificateLevel::kSampled:
       return v1::CERTIFICATE_LEVEL_SAMPLED;
     case core::CertificateLevel::kProved:

@@ -61,7 +61,8 @@ CORE = {
         "core/sampling",
         "core/speculation",
     ),
-    "core/mesher.cc": ("core", "core/base", "core/run"),  # the one door from the face
+    # The doors from the face.
+    "core/mesher.cc": ("core", "core/base", "core/run"),
 }
 
 # What the server may take of the core.
