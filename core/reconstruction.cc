@@ -121,65 +121,6 @@ Status Validate(const ReconstructionSpecification& spec, const PointCloud& cloud
   return CheckTangents(cloud.tangents, k, d);
 }
 
-const char* PlaceName(Place place) {
-  switch (place) {
-    case Place::kOk:
-      return "OK";
-    case Place::kMerged:
-      return "MERGED";
-    case Place::kDropped:
-      return "DROPPED";
-    case Place::kTiled:
-      return "TILED";
-    case Place::kWeighted:
-      return "WEIGHTED";
-    case Place::kEdge:
-      return "EDGE";
-    case Place::kSheets:
-      return "SHEETS";
-    case Place::kNoise:
-      return "NOISE";
-    case Place::kSparse:
-      return "SPARSE";
-    case Place::kClose:
-      return "CLOSE";
-    case Place::kDisagree:
-      return "DISAGREE";
-  }
-  return "UNKNOWN";
-}
-
-const char* PlaceAdvice(Place place) {
-  switch (place) {
-    case Place::kOk:
-      return "nothing to do";
-    case Place::kMerged:
-      return "the point equals an earlier one, which stands for both";
-    case Place::kDropped:
-      return "the point was left out: the others make a manifold, and with it they do not";
-    case Place::kTiled:
-      return "stars disagreed here, and a tiling of the place replaces them";
-    case Place::kWeighted:
-      return "the point has a weight, by which the stars agree";
-    case Place::kEdge:
-      return "the manifold ends here, or the points have a hole: allow a boundary, or add points";
-    case Place::kSheets:
-      return "another part of the manifold is as near as the neighbours are: add points there";
-    case Place::kNoise:
-      return "the noise is more than half of the spacing: average the points, or thin them";
-    case Place::kSparse:
-      return "tangent spaces turn too far from point to point: about 2.3 times as many points are "
-             "needed here";
-    case Place::kClose:
-      return "two points are much nearer to each other than the spacing: thin the points, or allow "
-             "to drop more of them";
-    case Place::kDisagree:
-      return "stars disagree here for no cause that was found: add points, or allow to drop more "
-             "of them";
-  }
-  return "";
-}
-
 const char* ReconstructionPhaseName(ReconstructionPhase phase) {
   switch (phase) {
     case ReconstructionPhase::kIndexing:

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/base/interruption.h"
+#include "core/places.h"
 #include "core/report.h"
 #include "core/status.h"
 
@@ -53,41 +54,6 @@ struct PointCloud {
 // or an absurd size in a coordinate, too few points, tangent vectors that are not orthonormal.
 Status Validate(const ReconstructionSpecification& spec, const PointCloud& cloud);
 
-// What became of a point. The numbers are on the wire, and never change.
-enum class Place : std::uint8_t {
-  kOk = 0,        // its star was right as it was built
-  kMerged = 1,    // equals an earlier point, which stands for it; in no simplex
-  kDropped = 2,   // left out (ReconstructionSpecification::drop); in no simplex
-  kTiled = 3,     // stars disagreed around it; a tiling of the place agrees
-  kWeighted = 4,  // has a weight, by which stars agree
-  // What is not resolved has one of these, the first that applies.
-  kEdge = 5,      // its star is open: M ends here, or has a hole in the sample
-  kSheets = 6,    // another part of M is as near as its neighbours
-  kNoise = 7,     // the noise is more than half of the spacing
-  kSparse = 8,    // tangent spaces turn too much from neighbour to neighbour: too few points
-  kClose = 9,     // another point is much nearer than the spacing
-  kDisagree = 10  // stars disagree for no such reason
-};
-const char* PlaceName(Place place);    // "OK", "MERGED", ...
-const char* PlaceAdvice(Place place);  // one plain sentence: the cause and the cure
-inline constexpr int kPlaces = 11;
-
-// What was found on the way, besides the certificate.
-struct ReconstructionCounts {
-  std::uint64_t places[kPlaces] = {};  // points, by Place
-  double spacing = 0;                  // median distance of a point to its nearest, length
-  double noise = 0;            // median rms distance of points to the fitted surface, length
-  double noise_ratio = 0;      // the same in units of the local spacing
-  bool smoothed = false;       // the complex was built on copies moved to the fitted surface
-  std::uint64_t doubtful = 0;  // simplices about which stars disagreed at first
-  std::uint64_t cavities = 0;  // the places that they made up
-  std::uint64_t tiles = 0;     // simplices of tilings
-  std::uint64_t unfilled_vertices = 0;  // vertices of cavities that were left
-  // The share of points around which the points look this many-dimensional, by k = 0 to 4; 0 is
-  // "more than 4".
-  double looks[5] = {};
-};
-
 // A reconstruction. Its vertices are the given points, by their columns; those that are merged or
 // dropped are in no simplex.
 struct Reconstruction {
@@ -101,13 +67,13 @@ struct Reconstruction {
   Eigen::MatrixXd tangents;     // as PointCloud::tangents: given or estimated
   std::vector<double> weights;  // by point, squared lengths; empty if there are none
   std::vector<double> noise;    // by point: rms distance to the fitted surface around, length
-  // The certificate is about the complex at the smoothed positions if there are any. Its level:
-  // kDecided  the complex is a closed manifold (or one with boundary), its stars embed; the
+  // Report::reconstruction is set. The certificate is about the complex at the smoothed positions
+  // if there are any. Its level: kDecided  the complex is a closed manifold (or one with boundary),
+  // its stars embed; the
   //           points say too little of M, and `certified` is false
   // kSampled  besides, the local evidence holds: noise, sheets, tilt
   // kProved   besides, the theorem holds of the declared reach
   Report report;
-  ReconstructionCounts counts;
 };
 
 enum class ReconstructionPhase {

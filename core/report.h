@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "core/places.h"
 #include "core/status.h"
 #include "core/walls.h"
 
@@ -190,6 +191,7 @@ struct Report {
   Status failure;  // the reason when termination is kOracleFailed
   Counts counts;
   Certificate certificate;
+  std::optional<ReconstructionCounts> reconstruction;  // of a reconstruction alone
 };
 
 }  // namespace stellate::core
