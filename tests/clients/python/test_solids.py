@@ -306,3 +306,38 @@ def test_a_composition_can_be_sent_to_other_processes(points):
     again = pickle.loads(pickle.dumps(part))
     assert (again.clearances(points) == part.clearances(points)).all()
     assert stellate.check(again).ok
+
+
+@pytest.mark.parametrize(
+    "materials, words",
+    [
+        ({}, "there are 0 materials; there may be 1 to 127"),
+        ({"a": 1}, "the material 'a' has to be a solid"),
+        (
+            {"a": s.Ball(), "b": s.Ball(at=(0, 0))},
+            "'b' is a solid of R.2, and the first one of R.3",
+        ),
+        ({"a": s.Ball(0.2), "b": s.Ball()}, "nothing of the material 'a'"),
+        ({"a": s.Cylinder()}, "goes on without end"),
+    ],
+)
+def test_materials_that_cannot_be_are_refused(materials, words):
+    with pytest.raises(stellate.InvalidArgument, match=words):
+        s.Labels(**materials)
+
+
+def test_materials_have_labels_by_their_names(rng):
+    composite = s.Labels(
+        matrix=s.Box([-1] * 3, [1] * 3), grain=s.Ball(0.6), bit=s.Ball(0.6, (0.9, 0, 0))
+    )
+    assert composite.names == ("matrix", "grain", "bit") and composite.label_of("grain") == 2
+    with pytest.raises(stellate.InvalidArgument, match="no material 'grit'"):
+        composite.label_of("grit")
+    x = rng.random((5_000, 3)) * 4 - 2
+    want = np.where((np.abs(x) < 1).all(axis=1), 1, 0)
+    want[norm(x, axis=1) < 0.6] = 2
+    want[norm(x - [0.9, 0, 0], axis=1) < 0.6] = 3
+    signs = composite.clearances(x) > 0
+    assert (composite.labels[signs @ (1 << np.arange(composite.walls))] == want).all()
+    again = pickle.loads(pickle.dumps(composite))
+    assert (again.labels == composite.labels).all()

@@ -157,9 +157,30 @@ def test_materials_are_regions(server, tmp_path):
     }
     assert counted["region_2"] == len(core.simplices)
     assert counted["wall_6"] == len(core.boundary[0].simplices)
+    # Outwards of the lower label, which is around the ball: into it.
+    triangles = read.cells_dict["triangle"][
+        read.cell_data_dict["gmsh:physical"]["triangle"] == tags["wall_6"]
+    ]
+    a, b, c = read.points[triangles].transpose(1, 0, 2)
+    assert ((np.cross(b - a, c - a) * (a + b + c)).sum(axis=1) < 0).all()
     assert sum(len(block.data) for block in meshio.read(tmp_path / "block.vtu").cells) == sum(
         counted.values()
     )
+
+
+def test_materials_by_name_the_later_ones_win(server):
+    composite = s.Labels(matrix=s.Box([-1] * 3, [1] * 3), grain=s.Ball(0.6), core=s.Ball(0.35))
+    mesh = stellate.mesh(composite, 0.25, server=server)
+    assert mesh.certified, mesh.report.certificate.verdict
+    parts = [mesh.region(composite.label_of(name)) for name in composite.names]
+    balls = [4 / 3 * np.pi * radius**3 for radius in (0.6, 0.35)]
+    assert volume(parts[0]) + volume(parts[1]) + volume(parts[2]) == pytest.approx(8)
+    assert volume(parts[1]) == pytest.approx(balls[0] - balls[1], rel=0.1)
+    assert volume(parts[2]) == pytest.approx(balls[1], rel=0.25)
+    assert [euler_characteristic(part.simplices) for part in parts] == [2, 2, 1]
+    traced = s.traced(lambda p: np.abs(p).max(axis=1) - 0.5, ([-1] * 3, [1] * 3))
+    mesh = stellate.mesh(s.Labels(around=s.Ball(), block=traced), 0.3, server=server)
+    assert mesh.certified and volume(mesh.region(2)) == pytest.approx(1)
 
 
 def test_a_smooth_union_is_one_wall(server):

@@ -18,7 +18,8 @@ class Group:
       name: "inside", or "region_1" of several regions; "wall_0", "walls_0_1", ...
       walls: their numbers, ascending.
       simplices: (m, j+1). The boundary's are turned as the mesh's own induce it: outwards, if
-        the mesh fills space.
+        the mesh fills space. What is between two regions is turned outwards from that of the
+        lower label.
     """
 
     tag: int
@@ -46,11 +47,13 @@ def groups(mesh: Complex, cells: np.ndarray) -> list[Group]:
             Group(number, f"region_{label}", (), cells[labels == label])
             for number, label in enumerate(np.unique(labels).tolist(), 1)
         ]
+    regions = [group.simplices for group in found]
     for dimension in reversed(range(mesh.dimension)):
         for face in mesh.faces(dimension):
             rows = face.simplices
             if dimension == mesh.dimension - 1 >= 1:
-                rows = _turned(rows, cells)
+                for region in reversed(regions):  # of several, the first one's turn stays
+                    rows = _turned(rows, region)
             plural = "s" if len(face.walls) > 1 else ""
             name = f"wall{plural}_" + "_".join(map(str, face.walls))
             found.append(Group(len(found) + 1, name, face.walls, rows))
@@ -58,9 +61,9 @@ def groups(mesh: Complex, cells: np.ndarray) -> list[Group]:
 
 
 def _turned(rows: np.ndarray, cells: np.ndarray) -> np.ndarray:
-    """The facets, ascending in each row, as the cells that have them induce their orientation."""
-    wanted = {tuple(row): i for i, row in enumerate(rows.tolist())}
-    on = np.zeros(int(cells.max()) + 1, dtype=bool)
+    """The facets as the cells that have them induce their orientation; others as they are."""
+    wanted = {tuple(row): i for i, row in enumerate(np.sort(rows, axis=1).tolist())}
+    on = np.zeros(int(max(cells.max(), rows.max())) + 1, dtype=bool)
     on[rows] = True
     turned = rows.copy()
     for out in range(cells.shape[1]):

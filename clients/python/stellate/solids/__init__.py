@@ -8,6 +8,7 @@
 Each is an object that `stellate.mesh` takes. Their edges and corners are in the mesh exactly.
 """
 
+from ._materials import Labels
 from ._primitives import (
     Ball,
     Box,
@@ -30,6 +31,7 @@ __all__ = [
     "Cylinder",
     "HalfSpace",
     "Implicit",
+    "Labels",
     "Solid",
     "Torus",
     "blend",

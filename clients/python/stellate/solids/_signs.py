@@ -160,9 +160,9 @@ class Arrangement:
                 f"the solid has {len(self.walls)} walls, and a table of all their signs is made of "
                 f"{MOST_IN_TABLES} at most"
             )
-        codes = np.arange(1 << len(self.walls))
+        labels = self.inside(self.tree).astype(np.int8)
+        codes = np.arange(len(labels))
         signs = [(codes >> i & 1).astype(bool) for i in range(len(self.walls))]
-        labels = self._inside(self.tree, signs).astype(np.int8)
         for cube in self._impossible():
             at = np.ones(len(codes), dtype=bool)
             for i, positive in cube:
@@ -194,6 +194,12 @@ class Arrangement:
             there = self._inside(part, signs)
             inside = inside & there if isinstance(node, All) else inside | there
         return inside
+
+    def inside(self, node: Node) -> Flags:
+        """(2^m,), of the vectors of the walls' signs and a node whose walls are among these."""
+        codes = np.arange(1 << len(self.walls))
+        signs = [(codes >> i & 1).astype(bool) for i in range(len(self.walls))]
+        return self._inside(node, signs)
 
     def inside_at(self, signs: Flags) -> Flags:
         """(n, m) -> (n,), of sign vectors a row each."""

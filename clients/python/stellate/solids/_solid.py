@@ -165,18 +165,19 @@ class Solid:
 
     @functools.cached_property
     def bounding_box(self) -> tuple[Array, Array]:
-        tree, axes = self._tree, np.eye(self.dimension)
-        upper = np.array([support(tree, axis) for axis in axes])
-        lower = np.array([-support(tree, -axis) for axis in axes])
-        if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
-            raise InvalidArgument(
-                "the solid goes on without end, or is not known to end: cut it by a box, "
-                "solid & Box(lower, upper)"
-            )
-        if not (lower < upper).all():
-            raise InvalidArgument("the solid is empty: its parts lie apart from each other")
-        margin = _MARGIN * (upper - lower)
-        return lower - margin, upper + margin
+        return box_of(self._tree, self.dimension)
+
+    # What joins solids takes of them.
+
+    @property
+    def tree(self) -> Node:
+        """The Boolean of its walls."""
+        return self._tree
+
+    @property
+    def witnesses(self) -> tuple[Any, ...]:
+        """What else knows the inside."""
+        return self._witnesses
 
     # The oracle.
 
@@ -239,6 +240,21 @@ class Solid:
                     "and half-spaces are; this has edges, or several walls"
                 )
         return sign, node.wall, hull
+
+
+def box_of(tree: Node, d: int) -> tuple[Array, Array]:
+    """(lower (d,), upper (d,)) around a solid, with a margin. Raises: InvalidArgument."""
+    upper = np.array([support(tree, axis) for axis in np.eye(d)])
+    lower = np.array([-support(tree, -axis) for axis in np.eye(d)])
+    if not (np.isfinite(lower).all() and np.isfinite(upper).all()):
+        raise InvalidArgument(
+            "the solid goes on without end, or is not known to end: cut it by a box, "
+            "solid & Box(lower, upper)"
+        )
+    if not (lower < upper).all():
+        raise InvalidArgument("the solid is empty: its parts lie apart from each other")
+    margin = _MARGIN * (upper - lower)
+    return lower - margin, upper + margin
 
 
 def _on_side(wall: Wall, positive: bool) -> Wall:
