@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _convert, _faces, _html, _plot, _slice, viewer
+from . import _convert, _faces, _html, _measures, _plot, _slice, viewer
 from ._faces import Face
 from ._files import formats
 from ._files.orientation import orient, turn_outwards, turn_positive
+from ._measures import Curvature
 from ._wire.orientation import Orientation
-from .errors import UncertifiedWarning
+from .errors import InvalidArgument, UncertifiedWarning
 from .report import Progress, Report
 
 if TYPE_CHECKING:
@@ -115,6 +116,80 @@ class Mesh:
         elif self.dimension == self.ambient_dimension:
             turn_positive(self.points, oriented)
         return oriented
+
+    # What is measured. Vertices lie on M: volumes are right to O(epsilon^2).
+
+    @property
+    def volume(self) -> float:
+        """The k-volume: the length of a curve, the area of a surface; of a region its own.
+
+        Its error is O(epsilon^2).
+        """
+        return float(_measures.volumes(self.points, self.simplices).sum())
+
+    @property
+    def area(self) -> float:
+        """Of a surface, to O(epsilon^2); of a mesh of tetrahedra that of its boundary.
+
+        Raises: InvalidArgument for meshes of other dimensions, which have a `volume`.
+        """
+        if self.dimension == 2:
+            return self.volume
+        if self.dimension == 3:
+            return self.boundary_mesh().volume
+        raise InvalidArgument(f"a mesh of dimension {self.dimension} has a volume, and no area")
+
+    @property
+    def enclosed_volume(self) -> float:
+        """What a closed hypersurface (k = d - 1) encloses, to O(epsilon^2).
+
+        Components count by their orientation: those of a mesh that the server made outwards, each by
+        itself; of a boundary_mesh() around a cavity inwards, so that it is the solid's volume.
+
+        Raises: InvalidArgument where there is a boundary, or no orientation.
+        """
+        return _measures.enclosed_volume(self)
+
+    @property
+    def euler(self) -> int:
+        """The Euler characteristic, counted from the simplices and their faces."""
+        return _measures.euler(self.simplices)
+
+    def normals(self) -> np.ndarray:
+        """(m, d): the unit normals of a hypersurface's simplices, which agree with each other.
+
+        Outwards where it is closed. Each is within O(epsilon) of M's at the simplex.
+
+        Raises: InvalidArgument in other codimensions, and where it is not orientable.
+        """
+        return _measures.normals(self)
+
+    def point_volumes(self) -> np.ndarray:
+        """(n,): how much of the volume goes with each point.
+
+        The integral of a smooth function is `values @ mesh.point_volumes()`, to O(epsilon^2).
+        """
+        return _measures.point_volumes(self.points, self.simplices)
+
+    def boundary_mesh(self) -> Mesh:
+        """The facets in one simplex alone, a mesh of dimension k - 1 of the same points.
+
+        Oriented as this mesh induces it: outwards, of simplices that fill space.
+        """
+        facets, orientation = _measures.boundary_of(self)
+        return Mesh(self.points, facets, None, None, self.revision, self.walls, orientation)
+
+    def curvature(self, oracle: Any) -> Curvature:
+        """How a hypersurface bends at its points, by the equation that the oracle has.
+
+        Args:
+          oracle: an ImplicitManifold, a SignedDistance or any other with a `jacobian` of one equation,
+            of which differences are taken.
+
+        Returns: `principal` (n, k), `mean` (n,) and `gauss` (n,), with the mesh's normals.
+        Raises: InvalidArgument for other manifolds.
+        """
+        return _measures.curvature(self, oracle)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the mesh in the format that the file name's ending says.
