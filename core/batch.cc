@@ -341,6 +341,11 @@ bool AnswerBlock::Fits(const AnswerBlock& shape) const {
   return fits;
 }
 
+Status CheckAnswerShape(const Specification& spec, const QueryBlock& block, Eigen::Index first,
+                        const AnswerBlock& answer) {
+  return CheckShape(spec, block, first, answer);
+}
+
 Status CheckAnswers(const Specification& spec, const QueryBlock& block, Eigen::Index first,
                     const AnswerBlock& answer) {
   if (Status s = CheckShape(spec, block, first, answer); !s.ok()) return s;

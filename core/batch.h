@@ -200,6 +200,11 @@ inline constexpr double kSameSizeTolerance = 0.1;
 // to a point far from the origin.
 inline constexpr double kRoundingTolerance = 1e-13;
 
+// Checks the counts alone: each array has the shape that `block` asks for. The message says which
+// has not. Pure; any thread.
+Status CheckAnswerShape(const Specification& spec, const QueryBlock& block, Eigen::Index first,
+                        const AnswerBlock& answer);
+
 // Checks the answers to queries [first, first + answer.points.cols()) of `block`, as far as one
 // answer alone can be checked: counts, finite numbers, on the flat, within the radius, orthonormal
 // tangents, positive sizes. The message holds the query's index in the block, the value and the

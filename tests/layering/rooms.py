@@ -61,8 +61,10 @@ CORE = {
         "core/sampling",
         "core/speculation",
     ),
+    "core/examination": ("core", "core/base"),  # whether an oracle keeps its contract
     # The doors from the face.
     "core/mesher.cc": ("core", "core/base", "core/run"),
+    "core/examiner.cc": ("core", "core/base", "core/examination"),
 }
 
 # What the server may take of the core.
@@ -282,6 +284,7 @@ TABLE = Table(
             "core/certificate/claims/proof.cc",
             "core/certificate/claims/reach_claims.cc",
             "core/certificate/measure/shape.cc",
+            "core/examination/probe.cc",
             "core/geometry/reach.cc",
             "core/geometry/simplex.cc",
             "core/boundary/sharp_edges.cc",
