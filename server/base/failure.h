@@ -43,7 +43,8 @@ std::optional<FailureReason> FailureReasonOf(std::string_view name);  // nothing
 
 struct MeshFailure {
   FailureReason reason = FailureReason::kNone;
-  std::string message;  // for people
+  std::string message;          // for people
+  std::string oracle_reason{};  // OracleFailure.reason; not recorded
 };
 
 // A refusal of the core, as what ends a mesh.

@@ -35,6 +35,7 @@ constexpr ReasonRow kCodes[] = {
     {v1::ERROR_REASON_ORACLE_BAD_CONORMAL, grpc::StatusCode::INVALID_ARGUMENT},
     {v1::ERROR_REASON_ORACLE_NOT_IDEMPOTENT, grpc::StatusCode::INVALID_ARGUMENT},
     {v1::ERROR_REASON_ORACLE_FAILED, grpc::StatusCode::ABORTED},
+    {v1::ERROR_REASON_NO_WORKER, grpc::StatusCode::FAILED_PRECONDITION},
 };
 
 struct CoreRow {

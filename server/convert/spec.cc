@@ -229,7 +229,7 @@ Refused ReadTimeouts(const v1::MeshLimits& limits, const Config& config, OracleT
 
 }  // namespace
 
-Allowed<MeshRequest> FromProto(const v1::MeshSpec& spec, const Config& config) {
+Allowed<MeshRequest> ReadSpec(const v1::MeshSpec& spec, const Config& config) {
   MeshRequest request;
   request.spec.epsilon = spec.epsilon();
   request.spec.oracle.intersect_flat = spec.oracle().intersect_flat();
@@ -252,8 +252,15 @@ Allowed<MeshRequest> FromProto(const v1::MeshSpec& spec, const Config& config) {
                                       kMaxLabelBytes, ": shorten it"));
   }
   if (status.ok()) status = CheckAbout(request.about);
-  if (status.ok()) status = core::Validate(request.spec);
   if (!status.ok()) return tl::unexpected(std::move(status));
+  return request;
+}
+
+Allowed<MeshRequest> FromProto(const v1::MeshSpec& spec, const Config& config) {
+  auto request = ReadSpec(spec, config);
+  if (!request) return request;
+  core::Status status = core::Validate(request->spec);
+  if (!status.ok()) return tl::unexpected(Refused(std::move(status)));
   return request;
 }
 

@@ -13,6 +13,9 @@ namespace stellate::server {
 // field's path in MeshSpec. core::Validate accepts the result.
 Allowed<MeshRequest> FromProto(const v1::MeshSpec& spec, const Config& config);
 
+// The same without core::Validate: its result may make no sense as a mesh.
+Allowed<MeshRequest> ReadSpec(const v1::MeshSpec& spec, const Config& config);
+
 // Without the seeds: there may be many, and the client that needs them sent them.
 void ToProto(const core::Specification& spec, v1::MeshSpec* out);
 

@@ -23,20 +23,27 @@ std::optional<std::int64_t> RowAtFault(const core::Specification& spec, const Ch
 
 }  // namespace
 
-Refused CheckAnswer(const core::Specification& spec, const Chunk& chunk,
-                    const core::AnswerBlock& answer) {
+Refused CheckAnswerShape(const core::Specification& spec, const Chunk& chunk,
+                         const core::AnswerBlock& answer) {
+  const AnswerPlace place{chunk.lease, std::nullopt};
   if (answer.points.cols() != chunk.count) {
-    return {AnswerPlace{chunk.lease, std::nullopt},
+    return {place,
             {StatusCode::kOracleShape,
              core::Message("answers to lease ", chunk.lease, " hold ", answer.points.cols(),
                            " points but the chunk has ", chunk.count,
                            " queries: send one point for each query")}};
   }
+  core::Status status = core::CheckAnswerShape(spec, chunk.block(), chunk.first, answer);
+  if (status.ok()) return status;
+  return {place, std::move(status)};
+}
+
+Refused CheckAnswer(const core::Specification& spec, const Chunk& chunk,
+                    const core::AnswerBlock& answer) {
+  if (Refused shape = CheckAnswerShape(spec, chunk, answer); !shape.ok()) return shape;
   core::Status status = core::CheckAnswers(spec, chunk.block(), chunk.first, answer);
   if (status.ok()) return status;
-  AnswerPlace place{chunk.lease, std::nullopt};
-  if (status.code != StatusCode::kOracleShape) place.row = RowAtFault(spec, chunk, answer);
-  return {place, std::move(status)};
+  return {AnswerPlace{chunk.lease, RowAtFault(spec, chunk, answer)}, std::move(status)};
 }
 
 }  // namespace stellate::server

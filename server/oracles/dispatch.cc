@@ -120,7 +120,8 @@ Index Dispatch::ShareOfTheRest(const Worker& worker) const {
 // Moves the front of the piece into the lease.
 void Dispatch::Cut(const Worker& worker, Piece* piece, Lease* lease) const {
   const std::size_t bytes = std::max<std::size_t>(blocks_[piece->block].bytes_per_query, 1);
-  auto full = static_cast<Index>(std::min(worker.pace.FullChunk(), 1e9));
+  const double most = keeps_blocks_whole_ ? 1e9 : worker.pace.FullChunk();
+  auto full = static_cast<Index>(std::min(most, 1e9));
   full = std::min(full, static_cast<Index>(options_.chunk_bytes / bytes));
   if (worker.max_chunk > 0) full = std::min(full, static_cast<Index>(worker.max_chunk));
   full = std::max<Index>(full, 1);
@@ -343,6 +344,7 @@ void Dispatch::Expire(TimePoint now) {
     if (worker.leases.empty()) continue;
     if (now < EndOf(worker.leases.front())) continue;
     worker.stalled = true;
+    keeps_blocks_whole_ = false;
     worker.pace.BeginAgain();
     TakeBack(&worker, /*timed_out=*/true);
   }

@@ -43,6 +43,11 @@ struct DispatchPolicy {
   Clock::duration hedge_floor = std::chrono::milliseconds(200);
   Clock::duration hedge_unknown = std::chrono::seconds(2);
 
+  // The queries examine the oracle: a block is one chunk, as far as its bytes allow and until a
+  // lease runs out; and answers are checked for their shape alone: the examination judges their
+  // values.
+  bool is_examination = false;
+
   // Share of a worker's queries that it is asked in addition, from another worker's chunks, to
   // compare the answers; before the round ends, at least one of each family that it answers. 0:
   // none.
@@ -96,7 +101,8 @@ class Dispatch {
   };
   enum class Failure { kNone, kNoWorker, kAnswerTimeout };
 
-  explicit Dispatch(DispatchOptions options) : options_(options) {}
+  explicit Dispatch(DispatchOptions options)
+      : options_(options), keeps_blocks_whole_(options.is_examination) {}
 
   void Begin(const std::vector<Block>& blocks, TimePoint now);
   void End();  // forgets the round; answers to its leases are late from now on
@@ -200,6 +206,7 @@ class Dispatch {
   DispatchOptions options_;
   bool active_ = false;
   bool timed_out_ = false;
+  bool keeps_blocks_whole_;
   std::vector<Block> blocks_;
   std::deque<Piece> pending_;
   Eigen::Index pending_queries_ = 0;

@@ -20,6 +20,8 @@ grpc::Status GetServerInfo(const Call& call, const v1::GetServerInfoRequest& req
                            v1::ServerInfo* info);
 grpc::ServerBidiReactor<Incoming<v1::ServeOracleRequest>, v1::ServeOracleResponse>* ServeOracle(
     ServerState& state, grpc::CallbackServerContext* context);
+grpc::ServerBidiReactor<Incoming<v1::ExamineRequest>, v1::ExamineResponse>* Examine(
+    ServerState& state, grpc::CallbackServerContext* context);
 grpc::ServerBidiReactor<Incoming<v1::WatchMeshRequest>, v1::WatchMeshResponse>* WatchMesh(
     ServerState& state, grpc::CallbackServerContext* context);
 grpc::ServerBidiReactor<Incoming<v1::DownloadMeshRequest>, v1::DownloadMeshResponse>* DownloadMesh(

@@ -160,7 +160,7 @@ class OracleStream final : public ServerStream<v1::ServeOracleRequest, v1::Serve
     const std::string words =
         failure.message().empty() ? "the oracle failed and did not say why" : WordsOf(failure);
     EndWith(Refusal(v1::ERROR_REASON_ORACLE_FAILED, words));
-    session()->pool().Fail({FailureReason::kOracleFailed, words});
+    session()->pool().Fail({FailureReason::kOracleFailed, words, failure.reason()});
     Leave();
   }
 

@@ -95,6 +95,7 @@ Rpcs::Rpcs(ServerState* state) : state_(*state) {
   AddUnary("/stellate.v1.Stellate/DeleteMesh", DeleteMesh);
   AddUnary("/stellate.v1.Stellate/GetServerInfo", GetServerInfo);
   AddStream("/stellate.v1.Stellate/ServeOracle", ServeOracle);
+  AddStream("/stellate.v1.Stellate/Examine", Examine);
   AddStream("/stellate.v1.Stellate/WatchMesh", WatchMesh);
   AddStream("/stellate.v1.Stellate/DownloadMesh", DownloadMesh);
 }

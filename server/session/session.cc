@@ -64,7 +64,7 @@ Clock::duration AgeOf(std::chrono::system_clock::time_point time) {
 
 Session::Session(SessionOptions options, MesherFactory factory)
     : options_(std::move(options)),
-      factory_(std::move(factory)),
+      factory_(options_.examiner ? options_.examiner : std::move(factory)),
       pool_(request().spec, DispatchOptions{request().timeouts, policy().dispatch},
             policy().max_workers, ports().observer),
       history_(options_),

@@ -42,8 +42,7 @@ struct SessionView {
 //   session->history().AddWatcher(watcher);         // watchers' streams, on any thread
 class Session {
  public:
-  using MesherFactory =
-      std::function<core::Expected<std::unique_ptr<core::Mesher>>(core::Specification)>;
+  using MesherFactory = server::MesherFactory;
 
   explicit Session(SessionOptions options, MesherFactory factory = core::Mesher::Create);
 

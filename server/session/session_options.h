@@ -5,6 +5,7 @@
 #include <memory>
 #include <optional>
 
+#include "core/mesher.h"
 #include "core/report.h"
 #include "server/memory/memory_budget.h"
 #include "server/oracles/oracle_pool.h"
@@ -19,6 +20,10 @@ class SessionObserver : public PoolObserver {
   virtual void OnRound(std::size_t queries) = 0;  // answered
   virtual void OnEnd(SessionState state, const core::Report& report) = 0;
 };
+
+// Makes what a session runs.
+using MesherFactory =
+    std::function<core::Expected<std::unique_ptr<core::Mesher>>(core::Specification)>;
 
 // What the server decides about a mesh, for every owner.
 struct MeshPolicy {
@@ -42,6 +47,7 @@ struct SessionOptions {
   MeshPolicy policy;
   SessionPorts ports;
   std::optional<SessionRecord> record;  // set: the journal has it from an earlier server
+  MesherFactory examiner;               // set: it examines an oracle, and no journal has it
 };
 
 }  // namespace stellate::server

@@ -97,7 +97,7 @@ Allowed<std::shared_ptr<Session>> SessionStore::Create(SessionOptions options) {
         Refused({core::StatusCode::kFailedPrecondition, "the server is stopping"}));
   }
   options.request.name = NewMeshName();
-  if (new_journal_) options.ports.journal = new_journal_();
+  if (new_journal_ && !options.examiner) options.ports.journal = new_journal_();
   Entry& entry = AddLocked(std::move(options), TimePoint::max());
   try {
     StartLocked(&entry);

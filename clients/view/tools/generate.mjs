@@ -19,6 +19,7 @@ execFileSync(
     "stellate/v1/geometry.proto",
     "stellate/v1/oracle.proto",
     "stellate/v1/mesh.proto",
+    "stellate/v1/doctor.proto",
     "stellate/v1/stellate.proto",
   ],
   { stdio: "inherit" },

@@ -185,7 +185,7 @@ TEST_F(LiveSafetyTest, AWithdrawnTokenEndsAStreamThatHasSentNoRequest) {
   StartWithTokens();
   const auto channel = grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials());
   grpc::GenericStub stub(channel);
-  for (const char* rpc : {"WatchMesh", "DownloadMesh", "ServeOracle"}) {
+  for (const char* rpc : {"WatchMesh", "DownloadMesh", "ServeOracle", "Examine"}) {
     WriteTokens(std::string("alice ") + kAlice + "\nbob " + kBob + "\n");
     server_->ReloadFiles();
     grpc::ClientContext context;

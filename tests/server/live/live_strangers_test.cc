@@ -97,7 +97,7 @@ TEST_F(LiveStrangersTest, CallersAreRefusedBeforeTheirRequestIsRead) {
   config.request_seconds = 5;  // else it would wait for the request
   StartTcp(config);
   for (const char* rpc : {"CreateMesh", "GetMesh", "ListMeshes", "CancelMesh", "DeleteMesh",
-                          "GetServerInfo", "ServeOracle", "WatchMesh", "DownloadMesh"}) {
+                          "GetServerInfo", "ServeOracle", "WatchMesh", "DownloadMesh", "Examine"}) {
     RawHttp2 stranger(port());
     stranger.Request(rpc, 4 << 20, 1);
     EXPECT_NE(stranger.AwaitAnswer().find("no token came"), std::string::npos) << rpc;
@@ -112,7 +112,7 @@ TEST_F(LiveStrangersTest, CallsWithoutARequestAreToldSo) {
   Start();
   grpc::GenericStub stub(
       grpc::CreateChannel(server_->address(), grpc::InsecureChannelCredentials()));
-  for (const char* rpc : {"GetMesh", "WatchMesh", "DownloadMesh"}) {
+  for (const char* rpc : {"GetMesh", "WatchMesh", "DownloadMesh", "Examine"}) {
     for (const char* request : {"", "\xff\xff"}) {
       grpc::ClientContext context;
       grpc::CompletionQueue queue;
