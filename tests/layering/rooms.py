@@ -166,7 +166,8 @@ PYTHON = {
     "options.py": (),
     "_wire": ("errors.py", "options.py", "oracle.py", "_wire/enums.py", "proto"),
     "_files": ("_complex.py", "_version.py", "errors.py"),
-    "_doctor": ("_html.py", "_lowest.py", "_shared.py", "errors.py", "oracle.py"),
+    "_findings.py": ("_html.py", "proto"),
+    "_rank.py": ("_findings.py", "_lowest.py", "_rows.py", "_shared.py", "oracle.py"),
     "_pipe": ("errors.py",),
 }
 

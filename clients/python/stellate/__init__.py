@@ -31,13 +31,12 @@ from . import report as report  # noqa: E402
 from . import server as server  # noqa: E402
 from . import solids as solids  # noqa: E402
 from . import viewer as viewer  # noqa: E402
-from ._api import download, mesh, serve, watch  # noqa: E402
+from ._api import check, download, mesh, serve, watch  # noqa: E402
 from ._command_oracle import CommandOracle  # noqa: E402
 from ._credentials import Credentials  # noqa: E402
-from ._doctor.check import check  # noqa: E402
-from ._doctor.findings import CheckReport, Finding  # noqa: E402
 from ._faces import Face  # noqa: E402
 from ._files.formats import check_save  # noqa: E402
+from ._findings import CheckReport, Finding  # noqa: E402
 from ._mesh import FinishedMesh, Mesh, load_txt  # noqa: E402
 from ._series import save_series  # noqa: E402
 from ._version import __version__ as __version__  # noqa: E402

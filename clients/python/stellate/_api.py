@@ -13,6 +13,7 @@ from ._credentials import Credentials
 from ._download import OnPart, Unfinished, fetch
 from ._epsilon import Epsilon
 from ._files.formats import check_save
+from ._findings import CheckReport
 from ._follow import Following, OnProgress
 from ._interrupt import Interrupts, told
 from ._mesh import FinishedMesh, Mesh
@@ -29,6 +30,36 @@ if TYPE_CHECKING:
     from typing_extensions import Unpack
 
 Path = Union[str, "os.PathLike[str]"]
+
+
+def check(
+    oracle: Any,
+    epsilon: float | None = None,
+    server: str | Server | Client | None = None,
+    credentials: Credentials | None = None,
+    *,
+    seed: int = 1,
+) -> CheckReport:
+    """Probes an oracle: is it what stellate.Oracle says an oracle is?
+
+    A server asks it, and says what it finds: finiteness and determinism; closest points that are
+    closest, on M and met at right angles; the dimension; tangent bases; sizes; walls, where there are
+    any; intersections with flats; smoothness; the reach and whether `epsilon` suits it; the components
+    seen; speed. Of equations, whether they lose rank.
+
+    Args:
+      oracle: see stellate.Oracle.
+      epsilon: that a mesh is planned with.
+      server, credentials: as for stellate.mesh.
+      seed: of the random queries.
+
+    Returns:
+      All that was found, `ok` if no error is among it. Exceptions of the oracle are findings too.
+    """
+    if isinstance(server, Client):
+        return server.check(oracle, epsilon, seed=seed)
+    with Client(server, credentials) as client:
+        return client.check(oracle, epsilon, seed=seed)
 
 
 @takes(MeshOptions)

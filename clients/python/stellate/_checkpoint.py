@@ -19,6 +19,7 @@ import numpy as np
 from google.protobuf.json_format import MessageToDict
 
 from ._epsilon import AUTO, Epsilon, choose
+from ._findings import CheckReport
 from ._generated import mesh_pb2 as pb
 from ._mesh import FinishedMesh
 from ._shared import table
@@ -108,12 +109,16 @@ class Checkpoint:
         return self._record.get("name", "")
 
     def choose_epsilon(
-        self, oracle: Any, epsilon: Epsilon, tell: Callable[[str], None]
+        self,
+        oracle: Any,
+        epsilon: Epsilon,
+        check: Callable[[Any], CheckReport],
+        tell: Callable[[str], None],
     ) -> tuple[float, str]:
         """As _epsilon.choose, which is asked for "auto" only once."""
         if epsilon == AUTO and self._record.get("epsilon_reason"):
             return self._record["spec"]["epsilon"], self._record["epsilon_reason"]
-        return choose(oracle, epsilon, tell)
+        return choose(oracle, epsilon, check, tell)
 
     @property
     def retries(self) -> int | None:

@@ -9,7 +9,7 @@ from typing import Any, Callable
 
 import numpy as np
 
-from ._doctor.findings import CheckReport
+from ._findings import CheckReport
 from ._generated import oracle_pb2 as pb
 from ._generated.mesh_pb2 import MeshSpec
 from ._mesh import FinishedMesh

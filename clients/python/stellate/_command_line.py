@@ -27,7 +27,6 @@ from ._api import download, mesh
 from ._command_oracle import CommandOracle
 from ._complex import Complex
 from ._credentials import Credentials
-from ._doctor.check import check
 from ._download import Unfinished
 from ._files.formats import check_save
 from ._oracle_source import Refused, add_oracle, name_of, oracle_of
@@ -220,7 +219,9 @@ def _download(options: argparse.Namespace) -> int:
 
 
 def _doctor(options: argparse.Namespace) -> int:
-    report = check(oracle_of(options), options.epsilon, seed=options.seed)
+    oracle = oracle_of(options)
+    with _connected(options) as client:
+        report = client.check(oracle, options.epsilon, seed=options.seed)
     print(report)
     return _WELL if report.ok else _NOT_CERTIFIED
 
@@ -325,6 +326,7 @@ def _parser(by_command: bool) -> argparse.ArgumentParser:
     add_oracle(one)
     one.add_argument("-e", "--epsilon", type=float, help="that a mesh is planned with")
     one.add_argument("--seed", type=int, default=1, help="of the random queries")
+    _add_connection(one, None)
     return parser
 
 

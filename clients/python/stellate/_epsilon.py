@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 import numbers
 from typing import Any, Callable, Literal, Union
 
 import numpy as np
 
-from ._doctor.check import check
+from ._findings import CheckReport
 from ._shared import table
 from .errors import InvalidArgument, OracleError
 from .report import Report
@@ -19,9 +18,12 @@ AUTO: Auto = "auto"
 
 
 def choose(
-    oracle: Any, epsilon: Epsilon, tell: Callable[[str], None] = lambda text: None
+    oracle: Any,
+    epsilon: Epsilon,
+    check: Callable[[Any], CheckReport],
+    tell: Callable[[str], None] = lambda text: None,
 ) -> tuple[float, str]:
-    """epsilon as it is and "", or for "auto" a quarter of the reach that check() finds, and why.
+    """epsilon as it is and "", or for "auto" what the server says after check(oracle), and why.
 
     `tell` is told before the oracle is asked, which may take a slow one long.
 
@@ -36,22 +38,11 @@ def choose(
         )
     tell("epsilon='auto': the oracle is asked for its reach first")
     report = check(oracle)
-    if not report.ok:
-        errors = [finding for finding in report.findings if finding.severity == "error"]
-        raise OracleError(
-            "epsilon='auto' takes the reach from the oracle's answers, and they cannot be trusted:\n"
-            + "\n".join(map(str, errors)),
-            "ORACLE_BREAKS_CONTRACT",
-        )
-    if report.reach is None or not math.isfinite(report.reach):
-        raise OracleError(
-            "epsilon='auto' takes the reach from the oracle's answers, and they show none: say how "
-            "large epsilon should be",
-            "ORACLE_NO_REACH",
-        )
-    chosen = _quarter(report.reach)
-    return chosen, (
-        f"a quarter of the reach, about {report.reach:.3g} by {report.queries:,} queries"
+    if report.epsilon is not None:
+        return report.epsilon, report.epsilon_reason
+    raise OracleError(
+        f"epsilon='auto' cannot be chosen: {report.epsilon_reason}",
+        "ORACLE_NO_REACH" if report.ok else "ORACLE_BREAKS_CONTRACT",
     )
 
 

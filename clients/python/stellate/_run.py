@@ -12,6 +12,7 @@ from typing import Any, Callable, TypeVar
 
 from ._checkpoint import Checkpoint
 from ._epsilon import Epsilon, choose, finer
+from ._findings import CheckReport
 from ._follow import Following, OnProgress
 from ._mesh import FinishedMesh, Mesh
 from ._shared import table
@@ -28,6 +29,9 @@ from .server import Server
 _log = logging.getLogger("stellate")
 
 M = TypeVar("M", bound=Mesh)
+Choice = Callable[
+    [Any, Epsilon, Callable[[Any], CheckReport], Callable[[str], None]], "tuple[float, str]"
+]
 
 _FAREWELL_SECONDS = 2.0  # that an oracle may take to come to an end when nobody waits for it
 
@@ -143,13 +147,20 @@ class Run:
             oracle = part_of(oracle, keep, options.get("seeds"))
         checked = CheckedOracle(oracle)
         mesh_spec(checked, 1.0, options)  # what is misspelt shows before the oracle is probed
-        choice: Callable[[Any, Epsilon, Callable[[str], None]], tuple[float, str]] = choose
+        choice: Choice = choose
         if checkpoint is not None:
             choice = checkpoint.choose_epsilon
         self._on_progress, self._checkpoint = on_progress, checkpoint
         self._epsilon_reason = ""
         self._where_it_ends: Callable[[], str] | None = getattr(oracle, "where_it_ends", None)
-        chosen = self._say(choice(oracle, epsilon, lambda text: _note(on_progress, text)))
+        chosen = self._say(
+            choice(
+                oracle,
+                epsilon,
+                lambda it: _check(it, server),
+                lambda text: _note(on_progress, text),
+            )
+        )
         kept = checkpoint.retries if checkpoint is not None else None
         most = table("doctor.toml")["auto_retries"] if kept is None else kept
         self._retries = most if self._epsilon_reason else 0
@@ -389,6 +400,14 @@ class Run:
             self._own_client.close()
         if self._server is not None:
             self._server.close(at_once=at_once)
+
+
+def _check(oracle: Any, server: str | Server | Client | None) -> CheckReport:
+    """With a server of its own, where there is none yet."""
+    if isinstance(server, Client):
+        return server.check(oracle)
+    with Client(server) as client:
+        return client.check(oracle)
 
 
 def _note(on_progress: OnProgress | None, text: str) -> None:

@@ -22,6 +22,7 @@ from .errors import (
     ExecutorError,
     FailedPrecondition,
     InvalidArgument,
+    OracleError,
     StellateError,
     from_rpc,
     protocol_error,
@@ -32,6 +33,9 @@ _ANSWER_BYTES = 3_000_000  # an answer has to stay below the server's 4 MB
 _MESSAGE_BYTES = 4000
 _LOOK_AGAIN_SECONDS = 0.1
 _KINDS = (pb.QUERY_KIND_CLOSEST_POINT, pb.QUERY_KIND_INTERSECT_FLAT)
+# Of OracleFailure: what our own checks of an answer say; all others are about its shape.
+_TOLD_APART = ("ORACLE_NOT_FINITE", "ORACLE_PRECISION", "ORACLE_TOUCHES_ZERO")
+_SHAPE = "ORACLE_SHAPE"
 _BUSY_SHARE = 0.25  # of the time that the server bears silence
 
 
@@ -329,9 +333,11 @@ class Worker:
         error: BaseException,
     ) -> None:
         """Sends the failure and waits until the server has taken note."""
-        said = traceback.format_exception_only(type(error), error)[-1].strip()
+        said, reason = traceback.format_exception_only(type(error), error)[-1].strip(), ""
+        if isinstance(error, OracleError):
+            said, reason = str(error), error.reason if error.reason in _TOLD_APART else _SHAPE
         message = said.encode()[:_MESSAGE_BYTES].decode(errors="ignore")
-        failure = pb.OracleFailure(lease=lease, message=message)
+        failure = pb.OracleFailure(lease=lease, message=message, reason=reason)
         outbox.put(pb.ServeOracleRequest(failure=failure))
         outbox.end()
         try:

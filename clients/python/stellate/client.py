@@ -8,9 +8,11 @@ from typing import TYPE_CHECKING, Any, Callable, TypeVar
 
 import grpc
 
+from ._check import examine
 from ._chunks import Declared, Puller
 from ._credentials import Credentials, stays_on_this_machine
 from ._epsilon import Epsilon, choose
+from ._findings import CheckReport
 from ._generated import mesh_pb2
 from ._generated import stellate_pb2 as pb
 from ._generated import stellate_pb2_grpc as rpc
@@ -101,9 +103,13 @@ class Client:
         checked = oracle if isinstance(oracle, CheckedOracle) else CheckedOracle(oracle)
         if options.get("speculative") is None and not stays_on_this_machine(self.address):
             options["speculative"] = True  # round trips are what a far server costs
-        spec = mesh_spec(checked, choose(oracle, epsilon)[0], options)
+        spec = mesh_spec(checked, choose(oracle, epsilon, self.check)[0], options)
         request = pb.CreateMeshRequest(spec=spec)
         return MeshInfo.from_wire(self._call(self._stub.CreateMesh, request, once=True))
+
+    def check(self, oracle: Any, epsilon: float | None = None, *, seed: int = 1) -> CheckReport:
+        """Probes an oracle for its contract: see stellate.check."""
+        return examine(self, self._stub, oracle, epsilon, seed)
 
     def get(self, name: str) -> MeshInfo:
         """A mesh as it stands. Raises MeshNotFound."""

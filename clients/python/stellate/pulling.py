@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 from ._checkpoint import Checkpoint
 from ._chunks import Chunk, Declared, Puller
 from ._credentials import Credentials
-from ._doctor.check import check
 from ._epsilon import Epsilon
 from ._generated.oracle_pb2 import QueryChunk, ServeOracleRequest
 from ._mesh import FinishedMesh
@@ -115,6 +114,8 @@ def pull_check(
     tangent_basis: bool = False,
     local_size: bool = False,
     walls: int = 0,
+    server: str | Server | None = None,
+    credentials: Credentials | None = None,
 ) -> Puller:
     """As stellate.check, of an oracle whose questions are answered in a loop of yours.
 
@@ -132,7 +133,8 @@ def pull_check(
     )  # fmt: skip
 
     def work() -> None:
-        puller.report = check(declared, epsilon)
+        with Client(server, credentials) as client:
+            puller.report = client.check(declared, epsilon)
 
     return puller.start(work).begun()
 

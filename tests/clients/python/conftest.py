@@ -1,4 +1,4 @@
-"""The package from the source tree, for tests that need no server."""
+"""The package from the source tree, for tests that need no server but for stellate.check."""
 
 import pathlib
 import sys

@@ -1,6 +1,7 @@
-"""stellate.check: each broken oracle is found out by the finding that names it."""
+"""Client.check: each broken oracle is found out by the finding that names it."""
 
 import pathlib
+import re
 import subprocess
 import sys
 
@@ -10,9 +11,20 @@ import stellate
 from shapes import equation
 from stellate import manifolds, oracles
 from stellate._command_line import main
-from stellate._doctor.findings import all_words
 
 PACKAGE = str(pathlib.Path(stellate.__file__).parents[1])
+WORDS = pathlib.Path(stellate.__file__).parents[3] / "core" / "examination" / "words.cc"
+# All findings of the server, and ours, with their severities.
+SEVERITIES = {
+    code: severity.lower()
+    for code, severity in re.findall(r'\{"([A-Z_]+)", Severity::k(\w+)', WORDS.read_text())
+} | {"SINGULAR": "error"}
+
+
+@pytest.fixture(scope="module")
+def client():
+    with stellate.Client() as client:
+        yield client
 
 
 class Torus(manifolds.Torus):
@@ -209,14 +221,14 @@ BROKEN = {
 
 
 @pytest.mark.parametrize("code", BROKEN)
-def test_a_broken_oracle_is_found_out(code):
-    report = stellate.check(BROKEN[code])
+def test_a_broken_oracle_is_found_out(client, code):
+    report = client.check(BROKEN[code])
     assert code in report.codes, report
     assert report.ok == all(f.severity != "error" for f in report.findings)
     (finding,) = [f for f in report.findings if f.code == code]
     assert finding.advice or finding.severity == "note"
     assert code in str(report)
-    assert finding.severity == all_words()[code].severity
+    assert finding.severity == SEVERITIES[code]
 
 
 @pytest.mark.parametrize(
@@ -235,8 +247,8 @@ def test_a_broken_oracle_is_found_out(code):
     ],
     ids=lambda oracle: f"{type(oracle).__name__}-{oracle.dimension}-{oracle.ambient_dimension}",
 )
-def test_a_good_oracle_passes(oracle):
-    report = stellate.check(oracle)
+def test_a_good_oracle_passes(client, oracle):
+    report = client.check(oracle)
     assert report.ok, report
     assert report.pieces == 1
     assert report.best_batch in report.rates and min(report.rates.values()) > 0
@@ -258,21 +270,21 @@ def test_a_good_oracle_passes(oracle):
         oracles.Solid(box=([0, 0], [1, 2])),
     ],
 )
-def test_good_walls_pass(oracle):
-    report = stellate.check(oracle)
+def test_good_walls_pass(client, oracle):
+    report = client.check(oracle)
     assert report.ok, report
     assert set(report.codes) <= {"REACH", "PIECES", "SPEED", "SLOW", "NOT_CLOSEST_FAR"}, report
 
 
-def test_the_reach_of_a_boundary_counts():
-    ball = stellate.check(oracles.Solid(ball=([0] * 3, 0.7)))
+def test_the_reach_of_a_boundary_counts(client):
+    ball = client.check(oracles.Solid(ball=([0] * 3, 0.7)))
     assert ball.reach == pytest.approx(0.7, rel=1e-6)
-    assert stellate.check(CUT).reach == pytest.approx(0.99**0.5, rel=1e-6)
-    cube = stellate.check(oracles.Solid(box=([0] * 3, [1] * 3)))
+    assert client.check(CUT).reach == pytest.approx(0.99**0.5, rel=1e-6)
+    cube = client.check(oracles.Solid(box=([0] * 3, [1] * 3)))
     assert 0.5 < cube.reach < 2  # nothing bends there
 
 
-def test_a_corner_does_not_hide_behind_tangents_of_its_own():
+def test_a_corner_does_not_hide_behind_tangents_of_its_own(client):
     """A can: smooth except at two rims, and with tangent bases that are right everywhere else."""
 
     def can(x):
@@ -286,17 +298,17 @@ def test_a_corner_does_not_hide_behind_tangents_of_its_own():
 
     box = np.full(3, -1.3), np.full(3, 1.3)
     oracle = Torus(closest_point=can, tangent_basis=None, intersect_flat=None, bounding_box=box)
-    assert "ROUGH" in stellate.check(oracle).codes
+    assert "ROUGH" in client.check(oracle).codes
 
 
-def test_the_reach_and_what_epsilon_suits_it():
-    report = stellate.check(GOOD, epsilon=0.3)
+def test_the_reach_and_what_epsilon_suits_it(client):
+    report = client.check(GOOD, epsilon=0.3)
     assert report.ok and "COARSE_EPSILON" in report.codes
     assert report.reach == pytest.approx(0.4, rel=0.05)
-    assert "COARSE_EPSILON" not in stellate.check(GOOD, epsilon=0.1).codes
+    assert "COARSE_EPSILON" not in client.check(GOOD, epsilon=0.1).codes
 
 
-def test_pieces_are_counted():
+def test_pieces_are_counted(client):
     def two_spheres(x):
         centre = np.where(x[:, :1] > 0, 1.5, -1.5) * [1.0, 0.0, 0.0]
         away = x - centre
@@ -306,17 +318,17 @@ def test_pieces_are_counted():
     oracle = Torus(
         closest_point=two_spheres, tangent_basis=None, intersect_flat=None, bounding_box=box
     )
-    report = stellate.check(oracle)
+    report = client.check(oracle)
     assert report.ok and report.pieces == 2, report
 
 
-def test_seeds_alone_will_do():
-    report = stellate.check(Torus(bounding_box=None, seeds=np.array([[1.4, 0, 0]])))
+def test_seeds_alone_will_do(client):
+    report = client.check(Torus(bounding_box=None, seeds=np.array([[1.4, 0, 0]])))
     assert report.ok and report.samples > 100, report
 
 
-def test_the_same_questions_find_the_same():
-    codes = [stellate.check(BROKEN["NOT_NORMAL"], seed=7).findings[0] for _ in range(2)]
+def test_the_same_questions_find_the_same(client):
+    codes = [client.check(BROKEN["NOT_NORMAL"], seed=7).findings[0] for _ in range(2)]
     assert codes[0].message == codes[1].message
 
 
@@ -351,8 +363,8 @@ def test_what_is_no_oracle_is_refused(name, capsys):
 
 
 def test_all_words_are_put_to_use():
-    """Whatever findings.txt lists is tested above, or a plain measure."""
-    untested = set(all_words()) - set(BROKEN)
+    """Whatever the server has words for is tested above, or a plain measure."""
+    untested = set(SEVERITIES) - set(BROKEN)
     assert untested == {
         "COARSE_EPSILON", "NOT_CLOSEST_FAR", "NO_TANGENTS", "PIECES", "REACH", "SLOW", "SPEED",
     }  # fmt: skip

@@ -108,7 +108,7 @@ def apart(monkeypatch):
     monkeypatch.setattr(_run, "Following", Following)
     monkeypatch.setattr(_run, "_Workers", Workers)
 
-    def choose(oracle, epsilon, tell):
+    def choose(oracle, epsilon, check, tell):
         return (0.8, "so") if epsilon == "auto" else (epsilon, "")
 
     monkeypatch.setattr(_run, "choose", choose)

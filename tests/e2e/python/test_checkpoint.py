@@ -154,13 +154,13 @@ class TwoCircles:
 
     dimension, ambient_dimension = 1, 2
     bounding_box = [-1.1, -1.1], [1.2, 1.1]
-    seeds = [[-1, 0], [1.05, 0.005]]
+    seeds = [[-1, 0], [1.05, 0.01]]
 
     def closest_point(self, x):
         y = x - [1.05, 0]
         away, beside = (np.sqrt((z * z).sum(axis=1, keepdims=True)) for z in (x, y))
-        large = np.abs(away - 1) <= np.abs(beside - 0.005)
-        return np.where(large, x / away, [1.05, 0] + y * (0.005 / beside))
+        large = np.abs(away - 1) <= np.abs(beside - 0.01)
+        return np.where(large, x / away, [1.05, 0] + y * (0.01 / beside))
 
 
 class Leaving:

@@ -1,1 +1,0 @@
-"""Is an oracle what it should be?"""
