@@ -47,8 +47,9 @@ if(NOT STELLATE_CORE_ONLY)
     set(without REGEX "/(oracles|oracles/(equations|parametrized|points)).h$" EXCLUDE)
   endif()
   install(DIRECTORY clients/cpp/include/stellate DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}
-    COMPONENT development PATTERN error.h EXCLUDE PATTERN oracle.h EXCLUDE ${without})
+    COMPONENT development PATTERN error.h EXCLUDE PATTERN oracle.h EXCLUDE PATTERN "*.in" EXCLUDE ${without})
   install(DIRECTORY ${PROJECT_BINARY_DIR}/installed/stellate
+    ${PROJECT_BINARY_DIR}/clients/cpp/include/stellate
     DESTINATION ${CMAKE_INSTALL_INCLUDEDIR} COMPONENT development)
 endif()
 configure_package_config_file(cmake/stellateConfig.cmake.in stellateConfig.cmake

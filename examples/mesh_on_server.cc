@@ -11,11 +11,10 @@ int main(int argc, char** argv) {
     std::cerr << "name the file to write\n";
     return EXIT_FAILURE;
   }
-  std::string error;
-  const auto torus = stellate::MakeManifold("torus", &error);
+  const auto torus = stellate::MakeManifold("torus").value();
   stellate::MeshOptions options;
   options.epsilon = 0.15;
-  if (argc > 2) options.server = argv[2];
+  if (argc > 2) options.connection.server = argv[2];
 
   const auto mesh = stellate::MeshManifold(*torus, options);
   if (!mesh) {

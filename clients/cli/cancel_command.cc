@@ -40,9 +40,9 @@ CancelCommand::CancelCommand(CLI::App& parent)
 }
 
 int CancelCommand::Run() const {
-  const Expected<Credentials> credentials = server_.ReadCredentials();
-  if (!credentials) return PrintError(credentials.error());
-  Expected<Monitor> monitor = Monitor::Connect(server_.address(), *credentials);
+  const Expected<Connection> connection = server_.Read();
+  if (!connection) return PrintError(connection.error());
+  Expected<Monitor> monitor = Monitor::Connect(*connection);
   if (!monitor) return PrintError(monitor.error());
   const Expected<std::vector<MeshStatus>> meshes = monitor->Meshes();
   if (!meshes) return PrintError(meshes.error());

@@ -26,11 +26,10 @@ DeclareCommand::DeclareCommand(CLI::App& parent)
 int DeclareCommand::Run(std::stop_token stop) {
   const Expected<std::unique_ptr<Oracle>> oracle = source_.Make(std::move(stop));
   if (!oracle) return PrintError(oracle.error());
-  Expected<Credentials> credentials = server_.ReadCredentials();
-  if (!credentials) return PrintError(credentials.error());
+  Expected<Connection> connection = server_.Read();
+  if (!connection) return PrintError(connection.error());
   MeshOptions& options = spec_.options;
-  options.server = server_.address();
-  options.credentials = std::move(*credentials);
+  options.connection = std::move(*connection);
   spec_.SetLabel(label_.empty() ? source_.name() : label_);
   options.on_epsilon = [](double epsilon, const std::string& reason) {
     std::fprintf(stderr, "epsilon %g, %s\n", epsilon, reason.c_str());

@@ -23,10 +23,7 @@ DownloadCommand::DownloadCommand(CLI::App& parent)
   command_->add_option("--revision", options_.revision, "the mesh as of this one; 0: the newest")
       ->capture_default_str()
       ->excludes(wait);
-  command_
-      ->add_option("--reconnect", options_.reconnect_seconds,
-                   "seconds to wait for a server that went away")
-      ->capture_default_str();
+  server_.AddReconnect(command_);
   command_->add_option("--report", report_, "file for the report as JSON");
   command_->add_flag("--json", json_, "print the report as JSON");
   command_->add_flag("-q,--quiet", quiet_, "no progress and no report");
@@ -35,10 +32,9 @@ DownloadCommand::DownloadCommand(CLI::App& parent)
 }
 
 int DownloadCommand::Run(std::stop_token stop) {
-  Expected<Credentials> credentials = server_.ReadCredentials();
-  if (!credentials) return PrintError(credentials.error());
-  options_.server = server_.address();
-  options_.credentials = std::move(*credentials);
+  Expected<Connection> connection = server_.Read();
+  if (!connection) return PrintError(connection.error());
+  options_.connection = std::move(*connection);
   if (wait_) options_.unfinished = Unfinished::kWait;
   if (unfinished_) options_.unfinished = Unfinished::kTake;
   ProgressBar bar(quiet_);
@@ -46,9 +42,9 @@ int DownloadCommand::Run(std::stop_token stop) {
   options_.on_found = [this](int k, int d) { return outputs_.Check(k, d); };
   options_.on_progress = [&bar](const Progress& progress) { bar.Show(progress); };
   options_.on_part = [&bar](auto received, auto all) { bar.ShowPart(received, all); };
-  options_.on_outage = [this, &bar](const Outage& outage) {
+  options_.connection.on_outage = [this, &bar](const Outage& outage) {
     bar.Clear();
-    PrintOutage(outage, options_.reconnect_seconds);
+    PrintOutage(outage, options_.connection.reconnect);
   };
   const Expected<Mesh> mesh = DownloadMesh(mesh_, options_);
   bar.Clear();

@@ -21,6 +21,7 @@
 #include "stellate/catalogue.h"
 #include "stellate/client.h"
 #include "stellate/oracles/walls.h"
+#include "stellate/version.h"
 #include "top_command.h"
 #include "view_command.h"
 
@@ -63,7 +64,7 @@ int List() {
   std::string syntax_width(22, ' ');
   for (const stellate::CatalogueEntry& entry : stellate::ListManifolds()) {
     std::printf("%-22s %s\n", entry.syntax.c_str(), entry.description.c_str());
-    const auto manifold = stellate::MakeManifold(entry.example, nullptr);
+    const auto manifold = stellate::MakeManifold(entry.example).value();
     const stellate::ManifoldFacts& facts = manifold->facts();
     std::string betti;
     for (const int b : facts.betti_mod2) {
@@ -84,9 +85,9 @@ int List() {
 }
 
 int Health(const stellate::cli::ServerOptions& server) {
-  const auto credentials = server.ReadCredentials();
-  if (!credentials) return PrintError(credentials.error());
-  const auto health = stellate::CheckHealth(server.address(), 5, *credentials);
+  const auto connection = server.Read();
+  if (!connection) return PrintError(connection.error());
+  const auto health = stellate::CheckHealth(*connection);
   if (!health) return PrintError(health.error());
   std::cout << server.address() << ": " << (health->serving ? "serving" : "not serving")
             << ", stellated " << health->version << "\n"

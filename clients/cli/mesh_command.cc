@@ -33,6 +33,7 @@ MeshCommand::MeshCommand(CLI::App& parent)
       source_(command_),
       server_(command_, ""),
       spec_(command_, /*serves=*/true) {
+  server_.AddReconnect(command_);
   outputs_.AddTo(command_);
   command_->add_flag("--closest-point-only", closest_point_only_,
                      "offer neither flat intersections nor tangent bases");
@@ -54,12 +55,9 @@ int MeshCommand::Run(std::stop_token stop) {
   if (const auto ok = outputs_.Check(oracle.dimension(), oracle.ambient_dimension()); !ok) {
     return PrintError(ok.error());
   }
-  options_.server = server_.address();
-  if (!options_.server.empty()) {
-    Expected<Credentials> credentials = server_.ReadCredentials();
-    if (!credentials) return PrintError(credentials.error());
-    options_.credentials = std::move(*credentials);
-  }
+  Expected<Connection> connection = server_.Read();
+  if (!connection) return PrintError(connection.error());
+  options_.connection = std::move(*connection);
   spec_.SetLabel("stellate mesh " + source_.name());
   options_.workers = std::max(options_.workers, source_.processes());
   options_.stop = std::move(stop);
@@ -75,9 +73,9 @@ Expected<Mesh> MeshCommand::MeshIt(Oracle& oracle) {
     if (!quiet_) std::fprintf(stderr, "epsilon %g, %s\n", epsilon, reason.c_str());
   };
   options_.on_progress = [&bar](const Progress& progress) { bar.Show(progress); };
-  options_.on_outage = [this, &bar](const Outage& outage) {
+  options_.connection.on_outage = [this, &bar](const Outage& outage) {
     bar.Clear();
-    PrintOutage(outage, options_.reconnect_seconds);
+    PrintOutage(outage, options_.connection.reconnect);
   };
   try {
     Expected<Mesh> mesh = MeshManifold(oracle, options_);

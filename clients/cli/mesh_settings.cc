@@ -7,9 +7,9 @@ using O = MeshOptions;
 
 constexpr MeshSetting kRun[] = {
     {"--seed", &O::random_seed, "seed of everything random"},
-    {"--worker-wait", &O::worker_wait_seconds, "seconds that the mesh waits for a worker"},
-    {"--answer", &O::answer_seconds, "that a worker may be silent over a chunk of queries"},
-    {"--busy", &O::busy_seconds, "that a worker may take for one in all"},
+    {"--worker-wait", &O::worker_wait, "seconds that the mesh waits for a worker"},
+    {"--answer", &O::answer_time, "that a worker may be silent over a chunk of queries"},
+    {"--busy", &O::busy_time, "that a worker may take for one in all"},
     {"--max-vertices", &O::max_vertices, "stop there"},
     {"--max-rounds", &O::max_rounds, "stop after this many round trips"},
     {"--max-batch-queries", &O::max_batch_queries, "ask larger rounds in several batches"},
@@ -22,7 +22,6 @@ constexpr MeshSetting kRun[] = {
 constexpr MeshSetting kServing[] = {
     {"--workers", &O::workers, "threads that answer the server"},
     {"--max-chunk", &O::max_chunk, "most points in one call of the oracle"},
-    {"--reconnect", &O::reconnect_seconds, "seconds to wait for a server that went away"},
 };
 
 constexpr MeshSetting kCriteria[] = {

@@ -13,7 +13,8 @@ namespace stellate::cli {
 using MeshField =
     std::variant<double MeshOptions::*, int MeshOptions::*, std::uint64_t MeshOptions::*,
                  std::optional<double> MeshOptions::*, std::optional<std::uint32_t> MeshOptions::*,
-                 std::optional<std::uint64_t> MeshOptions::*, std::optional<bool> MeshOptions::*>;
+                 std::optional<std::uint64_t> MeshOptions::*, std::optional<bool> MeshOptions::*,
+                 std::optional<Seconds> MeshOptions::*>;
 
 struct MeshSetting {
   const char* flag;  // as CLI11 takes it

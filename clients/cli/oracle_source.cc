@@ -68,6 +68,10 @@ Expected<std::unique_ptr<Oracle>> Clip(std::unique_ptr<Oracle> oracle,
   }
 }
 
+tl::unexpected<Error> NoSuch(const std::string& why) {
+  return Fail(ErrorCode::kRefused, why + "; 'stellate list' shows what there is");
+}
+
 }  // namespace
 
 OracleSource::OracleSource(CLI::App* command) {
@@ -127,13 +131,13 @@ Expected<std::unique_ptr<Oracle>> OracleSource::Make(std::stop_token stop) {
 
 Expected<std::unique_ptr<Oracle>> OracleSource::MakeUnclipped(std::stop_token stop) {
   if (command_.command.empty()) {
-    std::string why = "name a manifold, or give --oracle-command";
-    std::unique_ptr<Oracle> known;
-    if (!manifold_.empty()) known = oracles::MakeDomain(manifold_, &why);
-    if (!manifold_.empty() && known == nullptr && why.empty())
-      known = MakeManifold(manifold_, &why);
-    if (known != nullptr) return known;
-    return Fail(ErrorCode::kRefused, why + "; 'stellate list' shows what there is");
+    if (manifold_.empty()) return NoSuch("name a manifold, or give --oracle-command");
+    Expected<std::unique_ptr<Oracle>> domain = oracles::MakeDomain(manifold_);
+    if (domain) return domain;
+    if (domain.error().reason != "UNKNOWN_NAME") return NoSuch(domain.error().message);
+    Expected<std::unique_ptr<Manifold>> manifold = MakeManifold(manifold_);
+    if (!manifold) return NoSuch(manifold.error().message);
+    return std::unique_ptr<Oracle>(std::move(*manifold));
   }
   if (const auto ok = ReadWhereabouts(); !ok) return tl::unexpected(ok.error());
   command_.stop = std::move(stop);

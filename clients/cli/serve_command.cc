@@ -18,10 +18,7 @@ ServeCommand::ServeCommand(CLI::App& parent)
       server_(command_, "127.0.0.1:7717") {
   command_->add_option("--worker", options_.worker, "this worker's name, for logs");
   command_->add_option("--max-chunk", options_.max_chunk, "most points in one call of the oracle");
-  command_
-      ->add_option("--reconnect", options_.reconnect_seconds,
-                   "seconds to wait for a server that went away")
-      ->capture_default_str();
+  server_.AddReconnect(command_);
   command_->footer(
       "All workers of a mesh have to answer for one manifold.\n"
       "Exit status: 0 the mesh succeeded, 1 it ended otherwise or this worker was stopped, 2 usage "
@@ -31,12 +28,11 @@ ServeCommand::ServeCommand(CLI::App& parent)
 int ServeCommand::Run(std::stop_token stop) {
   const Expected<std::unique_ptr<Oracle>> oracle = source_.Make(stop);
   if (!oracle) return PrintError(oracle.error());
-  const Expected<Credentials> credentials = server_.ReadCredentials();
-  if (!credentials) return PrintError(credentials.error());
-  options_.server = server_.address();
-  options_.credentials = *credentials;
-  options_.on_outage = [this](const Outage& outage) {
-    PrintOutage(outage, options_.reconnect_seconds);
+  Expected<Connection> connection = server_.Read();
+  if (!connection) return PrintError(connection.error());
+  options_.connection = std::move(*connection);
+  options_.connection.on_outage = [this](const Outage& outage) {
+    PrintOutage(outage, options_.connection.reconnect);
   };
   options_.stop = std::move(stop);
   const Expected<MeshState> state = Serve(**oracle);

@@ -11,44 +11,55 @@
 
 namespace stellate::cli {
 
-ServerOptions::ServerOptions(CLI::App* command, const std::string& default_address)
-    : address_(default_address) {
+ServerOptions::ServerOptions(CLI::App* command, const std::string& default_address) {
+  connection_.server = default_address;
   CLI::Option* const server = command->add_option(
-      "--server", address_,
+      "--server", connection_.server,
       default_address.empty() ? "host:port or unix:/path; default: a private one is started"
                               : "host:port or unix:/path");
   if (!default_address.empty()) server->capture_default_str();
+  Credentials& credentials = connection_.credentials;
   CLI::Option_group* const safety = command->add_option_group("Safety");
-  safety->add_flag("--tls", credentials_.tls, "TLS, trusting the system's authorities");
-  safety->add_option("--tls-ca", credentials_.tls_ca, "PEM file: TLS, trusting these instead");
-  safety->add_option("--tls-cert", credentials_.tls_certificate,
+  safety->add_flag("--tls", credentials.tls, "TLS, trusting the system's authorities");
+  safety->add_option("--tls-ca", credentials.tls_ca, "PEM file: TLS, trusting these instead");
+  safety->add_option("--tls-cert", credentials.tls_certificate,
                      "PEM file with a client certificate, where the server asks for one");
-  safety->add_option("--tls-key", credentials_.tls_key, "PEM file with its key");
+  safety->add_option("--tls-key", credentials.tls_key, "PEM file with its key");
   safety->add_option("--token-file", token_file_,
                      "file that holds the token alone; default: $STELLATE_TOKEN, if set");
 }
 
-Expected<Credentials> ServerOptions::ReadCredentials() const {
-  Credentials credentials = credentials_;
+void ServerOptions::AddReconnect(CLI::App* command) {
+  command
+      ->add_option_function<double>(
+          "--reconnect", [this](double seconds) { connection_.reconnect = Seconds(seconds); },
+          "seconds to wait for a server that went away")
+      ->default_str(CLI::detail::to_string(connection_.reconnect.count()));
+}
+
+Expected<Connection> ServerOptions::Read() const {
+  Connection connection = connection_;
+  if (connection.server.empty()) return connection;
+  std::string& token = connection.credentials.token;
   if (token_file_.empty()) {
-    const char* const token = std::getenv("STELLATE_TOKEN");
-    if (token != nullptr) credentials.token = token;
-    return credentials;
+    const char* const from_environment = std::getenv("STELLATE_TOKEN");
+    if (from_environment != nullptr) token = from_environment;
+    return connection;
   }
   std::ifstream file(token_file_);
   std::string rest;
-  if (!(file >> credentials.token) || file >> rest) {
+  if (!(file >> token) || file >> rest) {
     return Fail(ErrorCode::kRefused, token_file_ + " must hold one token and nothing else");
   }
-  return credentials;
+  return connection;
 }
 
-void PrintOutage(const Outage& outage, double patience) {
+void PrintOutage(const Outage& outage, Seconds patience) {
   if (outage.over) {
-    std::fprintf(stderr, "stellate: the server is back after %.1f s\n", outage.seconds);
+    std::fprintf(stderr, "stellate: the server is back after %.1f s\n", outage.lasted.count());
   } else if (outage.attempts == 1) {
     std::fprintf(stderr, "stellate: lost the server (%s): trying again for up to %.0f s\n",
-                 text::Printable(outage.message, '?').c_str(), patience);
+                 text::Printable(outage.message, '?').c_str(), patience.count());
   }
 }
 

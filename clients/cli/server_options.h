@@ -4,7 +4,7 @@
 #include <string>
 
 #include "exit_status.h"
-#include "stellate/client.h"
+#include "stellate/connection.h"
 #include "stellate/report.h"
 
 namespace stellate::cli {
@@ -15,18 +15,22 @@ class ServerOptions {
   // An empty default stands for a private server.
   ServerOptions(CLI::App* command, const std::string& default_address);
 
-  const std::string& address() const { return address_; }
-  // The token comes from its file or from $STELLATE_TOKEN, so that `ps` does not show it.
-  Expected<Credentials> ReadCredentials() const;
+  // Adds --reconnect, for a command that waits for a server that went away.
+  void AddReconnect(CLI::App* command);
+
+  const std::string& address() const { return connection_.server; }
+  // The token comes from its file or from $STELLATE_TOKEN, so that `ps` does not show it; not read
+  // for a private server.
+  Expected<Connection> Read() const;
 
  private:
-  std::string address_, token_file_;
-  Credentials credentials_;
+  Connection connection_;
+  std::string token_file_;
 };
 
-// Says on standard error that the server was lost, or is back. `patience`: how long it is waited
-// for.
-void PrintOutage(const Outage& outage, double patience);
+// Says on standard error that the server was lost, or is back. `patience`: how long the command
+// waits for it.
+void PrintOutage(const Outage& outage, Seconds patience);
 
 // What servers and the oracles of others say is made text::Printable by both that follow.
 

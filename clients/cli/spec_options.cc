@@ -20,6 +20,9 @@ void Add(CLI::App* to, const MeshSetting& setting, MeshOptions* options) {
           // Not add_flag(value), which makes false of what nobody said.
           to->add_flag_function(
               setting.flag, [&value](std::int64_t said) { value = said > 0; }, setting.help);
+        } else if constexpr (std::is_same_v<T, std::optional<Seconds>>) {
+          to->add_option_function<double>(
+              setting.flag, [&value](double seconds) { value = Seconds(seconds); }, setting.help);
         } else {
           CLI::Option* const option = to->add_option(setting.flag, value, setting.help);
           if constexpr (std::is_arithmetic_v<T>) option->capture_default_str();
@@ -59,8 +62,11 @@ SpecOptions::SpecOptions(CLI::App* command, bool serves) {
 }
 
 void SpecOptions::SetEpsilon(const std::string& text) {
-  options.auto_epsilon = text == "auto";
-  if (options.auto_epsilon || CLI::detail::lexical_cast(text, options.epsilon)) return;
+  if (text == "auto") {
+    options.epsilon = kAuto;
+    return;
+  }
+  if (CLI::detail::lexical_cast(text, options.epsilon)) return;
   throw CLI::ValidationError("--epsilon", "has to be a length or auto, and is '" + text + "'");
 }
 

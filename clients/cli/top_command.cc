@@ -92,9 +92,9 @@ TopCommand::TopCommand(CLI::App& parent)
 }
 
 int TopCommand::Run(const std::stop_token& stop) const {
-  const Expected<Credentials> credentials = server_.ReadCredentials();
-  if (!credentials) return PrintError(credentials.error());
-  Expected<Monitor> monitor = Monitor::Connect(server_.address(), *credentials);
+  const Expected<Connection> connection = server_.Read();
+  if (!connection) return PrintError(connection.error());
+  Expected<Monitor> monitor = Monitor::Connect(*connection);
   if (!monitor) return PrintError(monitor.error());
   Expected<ServerHealth> health = monitor->Health();
   if (!health) return PrintError(health.error());

@@ -85,22 +85,20 @@ int ViewCommand::Run(std::stop_token stop) const {
 }
 
 int ViewCommand::WriteHtml(std::stop_token stop) const {
-  const Expected<Credentials> credentials = server_.ReadCredentials();
-  if (!credentials) return PrintError(credentials.error());
+  const Expected<Connection> connection = server_.Read();
+  if (!connection) return PrintError(connection.error());
   ProgressBar bar(false);
-  view::RecordOptions options{server_.address(), *credentials, {}, std::move(stop)};
+  view::RecordOptions options{*connection, {}, std::move(stop)};
   options.on_progress = [&bar](const Progress& progress) { bar.Show(progress); };
   const Expected<void> written = view::WriteRecording(mesh_, html_, options);
   bar.Clear();
   return written ? kExitCertified : PrintError(written.error());
 }
 
-Expected<void> ViewCommand::Serve(const std::string& server, const Credentials& credentials,
-                                  const std::stop_token& stop) const {
+Expected<void> ViewCommand::Serve(const Connection& connection, const std::stop_token& stop) const {
   view::GatewayOptions options;
-  options.server = server;
-  options.credentials = credentials;
-  options.title = demo_ ? "the catalogue" : server;
+  options.connection = connection;
+  options.title = demo_ ? "the catalogue" : connection.server;
   options.mesh = mesh_;
   options.port = port_;
   options.demo = demo_;
@@ -124,12 +122,12 @@ int ViewCommand::ShowLive(const std::stop_token& stop) const {
            "stellate.load_txt(file).show() in Python\n";
     return kExitRefused;
   }
-  const Expected<Credentials> credentials = server_.ReadCredentials();
-  if (!credentials) return PrintError(credentials.error());
-  // Whoever mistypes hears of it here, not in the browser.
-  const Expected<ServerHealth> health = CheckHealth(server_.address(), 5, *credentials);
+  const Expected<Connection> connection = server_.Read();
+  if (!connection) return PrintError(connection.error());
+  // A mistyped address shows here, not in the browser.
+  const Expected<ServerHealth> health = CheckHealth(*connection);
   if (!health) return PrintError(health.error());
-  const auto served = Serve(server_.address(), *credentials, stop);
+  const auto served = Serve(*connection, stop);
   return served ? kExitCertified : PrintError(served.error());
 }
 
@@ -144,7 +142,9 @@ int ViewCommand::ShowDemo(const std::stop_token& stop) const {
     });
     if (!meshed) PrintError(meshed.error());
   });
-  const auto served = Serve((*demo)->server(), {}, stop);
+  Connection own;
+  own.server = (*demo)->server();
+  const auto served = Serve(own, stop);
   meshing.request_stop();
   meshing.join();
   if (!served) return PrintError(served.error());

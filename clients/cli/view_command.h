@@ -20,8 +20,7 @@ class ViewCommand {
   int WriteHtml(std::stop_token stop) const;
   int ShowLive(const std::stop_token& stop) const;
   int ShowDemo(const std::stop_token& stop) const;
-  Expected<void> Serve(const std::string& server, const Credentials& credentials,
-                       const std::stop_token& stop) const;
+  Expected<void> Serve(const Connection& connection, const std::stop_token& stop) const;
 
   CLI::App* command_;
   ServerOptions server_;

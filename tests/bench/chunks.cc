@@ -19,6 +19,7 @@
 
 #include "server/oracles/dispatch.h"
 #include "tests/bench/timings.h"
+#include "tests/support/make_manifold.h"
 #include "tests/support/run_mesher.h"
 
 namespace stellate::bench {
@@ -48,9 +49,7 @@ struct Result {
 
 // The blocks of queries of each round.
 Rounds RoundsOf(const Work& work) {
-  std::string error;
-  const auto oracle = MakeManifold(work.manifold, &error);
-  if (oracle == nullptr) throw std::runtime_error(error);
+  const auto oracle = testing::Make(work.manifold);
   auto mesher = core::Mesher::Create(testing::SpecificationFor(*oracle, work.epsilon));
   Rounds rounds;
   while (const auto batch = (*mesher)->NextBatch()) {

@@ -20,6 +20,7 @@
 
 #include "server/history/mesh_history.h"
 #include "server/memory/memory_budget.h"
+#include "tests/support/make_manifold.h"
 #include "tests/support/run_mesher.h"
 
 namespace {
@@ -56,12 +57,7 @@ double Peak() {
 }
 
 Taken Mesh(const std::string& name, double epsilon) {
-  std::string error;
-  const auto manifold = stellate::MakeManifold(name, &error);
-  if (manifold == nullptr) {
-    std::fprintf(stderr, "%s\n", error.c_str());
-    std::exit(2);
-  }
+  const auto manifold = stellate::testing::Make(name);
   stellate::core::Specification spec = stellate::testing::SpecificationFor(*manifold, epsilon);
   spec.seeds.resize(0, 0);
   spec.threads = 1;

@@ -17,10 +17,13 @@
 
 #include "core/base/random.h"
 #include "tests/bench/timings.h"
+#include "tests/support/make_manifold.h"
 #include "tests/support/run_mesher.h"
 
 namespace stellate::bench {
 namespace {
+
+using testing::Make;
 
 using benchmark::State;
 using testing::ProcessorSeconds;
@@ -51,13 +54,6 @@ std::uint64_t Fingerprint(const core::Mesher& mesher) {
   for (const double x : points.reshaped()) sum = core::Mix64(sum ^ std::bit_cast<std::uint64_t>(x));
   for (const std::uint32_t id : mesher.Simplices()) sum = core::Mix64(sum ^ id);
   return sum;
-}
-
-std::shared_ptr<Manifold> Make(const std::string& name) {
-  std::string error;
-  std::shared_ptr<Manifold> manifold = MakeManifold(name, &error);
-  if (manifold == nullptr) throw std::runtime_error(error);
-  return manifold;
 }
 
 core::Specification OneThread(const Manifold& manifold, double epsilon) {

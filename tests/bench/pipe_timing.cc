@@ -15,7 +15,7 @@ int main(int argc, char** argv) {
   const auto oracle = stellate::StartCommand(command);
   if (!oracle) return std::cerr << oracle.error().message << "\n", 1;
   stellate::MeshOptions options;
-  options.server = argv[2];
+  options.connection.server = argv[2];
   while (std::cin >> options.epsilon) {
     const auto begin = std::chrono::steady_clock::now();
     const auto mesh = stellate::MeshManifold(**oracle, options);

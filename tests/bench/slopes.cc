@@ -9,19 +9,13 @@
 #include <vector>
 
 #include "tests/support/approximation.h"
+#include "tests/support/make_manifold.h"
 #include "tests/support/run_mesher.h"
 
 namespace stellate::testing {
 namespace {
 
 constexpr double kDegrees = 57.29577951308232;
-
-std::unique_ptr<Manifold> Make(const std::string& name) {
-  std::string error;
-  std::unique_ptr<Manifold> manifold = MakeManifold(name, &error);
-  if (manifold == nullptr) throw std::runtime_error(error);
-  return manifold;
-}
 
 const char* Verdict(const FinishedRun& run) {
   return run.report.certificate.certified ? "yes" : "NO";

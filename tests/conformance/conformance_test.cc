@@ -63,7 +63,7 @@ TEST_P(Stream, MakesThisMesh) {
                 static_cast<int>(NumberAt(entry, "ambient_dimension")));
   MeshOptions options;
   options.epsilon = 1;
-  options.server = replay.address();
+  options.connection.server = replay.address();
   const Expected<Mesh> mesh = MeshManifold(oracle, options);
   if (const std::string reason = TextAt(entry, "error"); !reason.empty()) {
     ASSERT_FALSE(mesh.has_value());
@@ -266,7 +266,7 @@ class Doctor : public ::testing::TestWithParam<Case> {};
 TEST_P(Doctor, FindsThis) {
   const std::string defect = TextAt(GetParam().entry, "defect");
   const bool torus = TextAt(GetParam().entry, "manifold") == "torus";
-  const auto good = MakeManifold(torus ? "torus:1:0.4" : "sphere:2", nullptr);
+  const auto good = MakeManifold(torus ? "torus:1:0.4" : "sphere:2").value();
   SpoiledOracle oracle(*good);
   int calls = 0;
   oracle.on_closest = [&](const Matrix& x, Answer& a) { SpoilPoints(defect, ++calls, x, &a); };

@@ -85,12 +85,12 @@ class Lune final : public Oracle {
  private:
   static int Axis(int wall) { return wall == 0 ? 2 : 1; }
 
-  const std::unique_ptr<Manifold> sphere_ = MakeManifold("sphere:2", nullptr);
+  const std::unique_ptr<Manifold> sphere_ = MakeManifold("sphere:2").value();
 };
 
 // A manifold of the catalogue, changed as the kit wants it.
 struct Changed {
-  explicit Changed(const std::string& name) : manifold(MakeManifold(name, nullptr)) {
+  explicit Changed(const std::string& name) : manifold(MakeManifold(name).value()) {
     if (manifold == nullptr) throw std::logic_error("the catalogue has no " + name);
     oracle = std::make_unique<SpoiledOracle>(*manifold);
     oracle->intersects = oracle->has_sizes = false;
@@ -140,7 +140,7 @@ std::string Words(const Error& error) {
 
 std::string Serve(Oracle& oracle, const std::string& mesh, const std::string& server) {
   ServeOptions options;
-  options.server = server;
+  options.connection.server = server;
   try {
     const auto state = ServeMesh(oracle, mesh, options);
     return state ? std::string("over ") + MeshStateName(*state) : Words(state.error());
@@ -154,7 +154,7 @@ std::string Watch(int k, int d, const std::string& path, const std::string& serv
   Silent oracle(k, d);
   MeshOptions options;
   options.epsilon = 1;
-  options.server = server;
+  options.connection.server = server;
   const Expected<Mesh> mesh = MeshManifold(oracle, options);
   if (!mesh) return Words(mesh.error());
   if (const auto saved = mesh->Save(path); !saved) return Words(saved.error());
@@ -170,13 +170,13 @@ std::string Create(const std::string& label, const std::string& how, const std::
   Changed torus("torus:1:0.4");
   MeshOptions options;
   options.epsilon = 0.5;
-  options.server = server;
+  options.connection.server = server;
   options.label = label;
   if (how == "seeds") {
     torus.oracle->box.reset();
     torus.oracle->given_seeds = Eigen::Vector3d(1.4, 0, 0);
   } else if (how.rfind("token=", 0) == 0) {
-    options.credentials.token = how.substr(6);
+    options.connection.credentials.token = how.substr(6);
   }
   Lune lune;
   Oracle& oracle = how == "walls" ? static_cast<Oracle&>(lune) : *torus.oracle;

@@ -10,7 +10,7 @@ class AutoEpsilon : public Live {
  protected:
   static MeshOptions Auto() {
     MeshOptions options = At(0);
-    options.auto_epsilon = true;
+    options.epsilon = kAuto;
     return options;
   }
 };

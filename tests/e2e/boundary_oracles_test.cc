@@ -182,7 +182,7 @@ TEST(Bounded, BadDeclarationsAreRefused) {
   says(refusal(Cap(), nullptr), "of its boundary");
   says(refusal(Cap(), RimOfCap(), -1), "positive share");
   const auto half =
-      std::make_shared<oracles::Clipped>(std::shared_ptr<Oracle>(MakeManifold("sphere:2", nullptr)),
+      std::make_shared<oracles::Clipped>(std::shared_ptr<Oracle>(MakeManifold("sphere:2").value()),
                                          std::vector{oracles::HalfSpace(VectorXd::Unit(3, 0))});
   says(refusal(half, RimOfCap()), "clip it instead");
 }

@@ -96,15 +96,15 @@ TEST_F(Failures, WhatOnProgressThrowsReachesTheCaller) {
 TEST_F(Failures, AServerThatIsNotThereIsReported) {
   const auto torus = Make("torus:1:0.4");
   MeshOptions options = At(0.1);
-  options.server = "unix:/nowhere/at/all";
+  options.connection.server = "unix:/nowhere/at/all";
   const Expected<Mesh> mesh = MeshManifold(*torus, options);
   ASSERT_FALSE(mesh.has_value());
   EXPECT_EQ(mesh.error().code, ErrorCode::kServerFailed);
-  EXPECT_FALSE(CheckHealth("unix:/nowhere/at/all").has_value());
+  EXPECT_FALSE(CheckHealth({"unix:/nowhere/at/all"}).has_value());
 }
 
 TEST_F(Failures, HealthKnowsTheServer) {
-  const auto health = CheckHealth(Server());
+  const auto health = CheckHealth({Server()});
   ASSERT_TRUE(health.has_value()) << health.error().message;
   EXPECT_TRUE(health->serving);
   EXPECT_FALSE(health->version.empty());

@@ -6,8 +6,8 @@
 #include <string>
 
 #include "net/embedded_server.h"
-#include "stellate/catalogue.h"
 #include "stellate/client.h"
+#include "support/make_manifold.h"
 
 namespace stellate::testing {
 
@@ -27,15 +27,8 @@ class Live : public ::testing::Test {
   static MeshOptions At(double epsilon) {
     MeshOptions options;
     options.epsilon = epsilon;
-    options.server = Server();
+    options.connection.server = Server();
     return options;
-  }
-
-  static std::unique_ptr<Manifold> Make(const std::string& spec) {
-    std::string error;
-    auto manifold = MakeManifold(spec, &error);
-    EXPECT_NE(manifold, nullptr) << error;
-    return manifold;
   }
 };
 

@@ -251,7 +251,7 @@ TEST_F(OracleCommand, ServesAMeshThatAnotherProgramDeclared) {
   EXPECT_EQ(result.status, 0) << result.output;
   EXPECT_EQ(result.output, name + " SUCCEEDED\n");
   DownloadOptions options;
-  options.server = Server();
+  options.connection.server = Server();
   const Expected<Mesh> made = DownloadMesh(name, options);
   ASSERT_TRUE(made) << made.error().message;
   ASSERT_TRUE(made->Save(Path("served.txt")));

@@ -78,11 +78,11 @@ class Restart : public ::testing::Test {
   explicit Restart(const std::string& manifold = "torus:1:0.4")
       : server_((fs::temp_directory_path() / ("stellate-restart-" + std::to_string(getpid())))
                     .string()),
-        torus_(MakeManifold(manifold, nullptr)),
+        torus_(MakeManifold(manifold).value()),
         oracle_(*torus_) {
     options_.epsilon = 0.15;
-    options_.server = server_.address();
-    options_.on_outage = [this](const Outage& outage) {
+    options_.connection.server = server_.address();
+    options_.connection.on_outage = [this](const Outage& outage) {
       ++(outage.over ? returns_ : failures_);
       if (!outage.over && on_failure_) on_failure_();
     };
@@ -107,7 +107,7 @@ class Restart : public ::testing::Test {
     EXPECT_EQ(disasters_, 0) << "nothing happened";
     EXPECT_GE(failures_, 1);
     EXPECT_GE(returns_, 1);
-    options_.keepalive_seconds = 60;
+    options_.connection.keepalive = Seconds(60);
     const Expected<Mesh> undisturbed = MeshManifold(*torus_, options_);
     ASSERT_TRUE(undisturbed.has_value()) << undisturbed.error().message;
     EXPECT_TRUE(AreIdentical(*mesh, *undisturbed));
@@ -150,14 +150,14 @@ TEST_F(Restart, AStoppedServerIsWaitedFor) {
 }
 
 TEST_F(Restart, AFrozenServerIsFoundByPings) {
-  options_.keepalive_seconds = 0.5;
+  options_.connection.keepalive = Seconds(0.5);
   AfterBatches(3, [this] { server_.Send(SIGSTOP); });
   on_failure_ = [this] { server_.Send(SIGCONT); };
   ExpectTheUndisturbedMesh();
 }
 
 TEST_F(Restart, AServerThatStaysAwayIsGivenUp) {
-  options_.reconnect_seconds = 0.2;
+  options_.connection.reconnect = Seconds(0.2);
   AfterBatches(2, [this] { server_.End(SIGKILL); });
   const Expected<Mesh> mesh = MeshManifold(oracle_, options_);
   ASSERT_FALSE(mesh.has_value());
@@ -186,17 +186,17 @@ TEST_F(Restart, TheWaitCanBeCancelled) {
 }
 
 TEST_F(Restart, CallsToAFrozenServerEndAtTheirDeadlines) {
-  Monitor monitor = Monitor::Connect(server_.address()).value();
-  ASSERT_TRUE(monitor.Health(60).has_value());
+  Monitor monitor = Monitor::Connect({server_.address()}).value();
+  ASSERT_TRUE(monitor.Health(Seconds(60)).has_value());
   server_.Freeze();
-  const auto health = monitor.Health(0.3);
-  const auto meshes = monitor.Meshes(0.3);
+  const auto health = monitor.Health(Seconds(0.3));
+  const auto meshes = monitor.Meshes(Seconds(0.3));
   server_.Send(SIGCONT);
   ASSERT_FALSE(health.has_value());
   EXPECT_EQ(health.error().code, ErrorCode::kServerFailed);
   ASSERT_FALSE(meshes.has_value());
   EXPECT_EQ(meshes.error().code, ErrorCode::kServerFailed);
-  while (!monitor.Meshes(60).has_value()) {  // the test's limit ends it
+  while (!monitor.Meshes(Seconds(60)).has_value()) {  // the test's limit ends it
   }
 }
 

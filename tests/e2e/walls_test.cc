@@ -31,9 +31,7 @@ class EveryDomain : public Live, public ::testing::WithParamInterface<DomainCase
 
 TEST_P(EveryDomain, IsMeshedUpToItsWalls) {
   const DomainCase& want = GetParam();
-  std::string why;
-  const auto domain = oracles::MakeDomain(want.spec, &why);
-  ASSERT_NE(domain, nullptr) << why;
+  const auto domain = oracles::MakeDomain(want.spec).value();
   const Expected<Mesh> mesh = MeshManifold(*domain, At(want.epsilon));
   ASSERT_TRUE(mesh.has_value()) << mesh.error().reason << ": " << mesh.error().message;
   const Certificate& certificate = mesh->report.certificate;
@@ -77,8 +75,7 @@ class WallsFromCpp : public Live {};
 
 // All that it has: corners that nobody told of, by the walls' own values.
 TEST_F(WallsFromCpp, GyroidInABoxHasItsCorners) {
-  std::string why;
-  const auto domain = oracles::MakeDomain("gyroid-box", &why);
+  const auto domain = oracles::MakeDomain("gyroid-box").value();
   const Expected<Mesh> mesh = MeshManifold(*domain, At(0.25));
   ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
   EXPECT_TRUE(mesh->report.certified()) << mesh->report.text;
@@ -121,16 +118,15 @@ TEST_F(WallsFromCpp, GradientsAreNotNeeded) {
 }
 
 TEST_F(WallsFromCpp, DownloadsKeepTheWalls) {
-  std::string why;
-  const auto domain = oracles::MakeDomain("half-torus", &why);
+  const auto domain = oracles::MakeDomain("half-torus").value();
   MeshOptions options = At(0.2);
   const Expected<std::string> name = DeclareMesh(*domain, options);
   ASSERT_TRUE(name.has_value()) << name.error().message;
   ServeOptions serve;
-  serve.server = Server();
+  serve.connection.server = Server();
   ASSERT_TRUE(ServeMesh(*domain, *name, serve).has_value());
   DownloadOptions download;
-  download.server = Server();
+  download.connection.server = Server();
   download.unfinished = Unfinished::kWait;
   const Expected<Mesh> fetched = DownloadMesh(*name, download);
   ASSERT_TRUE(fetched.has_value()) << fetched.error().message;
@@ -147,7 +143,7 @@ TEST_F(WallsFromCpp, WorkersOfOtherWallsAreRefused) {
   const Expected<std::string> name = DeclareMesh(one, At(0.3));
   ASSERT_TRUE(name.has_value()) << name.error().message;
   ServeOptions serve;
-  serve.server = Server();
+  serve.connection.server = Server();
   const auto served = ServeMesh(*sphere, *name, serve);
   ASSERT_FALSE(served.has_value());
   EXPECT_NE(served.error().message.find("1 walls"), std::string::npos) << served.error().message;
@@ -162,7 +158,7 @@ TEST(Walls, BadDeclarationsAreRefused) {
     }
     return "none";
   };
-  const std::shared_ptr<Oracle> sphere = MakeManifold("sphere:2", nullptr);
+  const std::shared_ptr<Oracle> sphere = MakeManifold("sphere:2").value();
   const VectorXd one = VectorXd::Ones(3);
   EXPECT_NE(refusal([&] { Clipped(sphere, {}); }).find("0 walls"), std::string::npos);
   EXPECT_NE(refusal([&] { Clipped(nullptr, {HalfSpace(one)}); }).find("no oracle"),
@@ -177,13 +173,10 @@ TEST(Walls, BadDeclarationsAreRefused) {
                                    {});
             }).find("clip it instead"),
             std::string::npos);
-  std::string why;
-  EXPECT_EQ(oracles::MakeDomain("hemisphere:1.5", &why), nullptr);
-  EXPECT_NE(why.find("whole number"), std::string::npos) << why;
-  EXPECT_EQ(oracles::MakeDomain("cube:3:3", &why), nullptr);
-  EXPECT_NE(why.find("at most 1"), std::string::npos) << why;
-  EXPECT_EQ(oracles::MakeDomain("torus", &why), nullptr);
-  EXPECT_TRUE(why.empty());
+  const auto why = [](const std::string& spec) { return oracles::MakeDomain(spec).error(); };
+  EXPECT_NE(why("hemisphere:1.5").message.find("whole number"), std::string::npos);
+  EXPECT_NE(why("cube:3:3").message.find("at most 1"), std::string::npos);
+  EXPECT_EQ(why("torus").reason, "UNKNOWN_NAME");
 }
 
 }  // namespace

@@ -49,7 +49,7 @@ TEST_F(Workers, AProgramJoinsAMeshByItsName) {
   ASSERT_TRUE(undisturbed.has_value());
   const std::string name = Declared(*torus, 0.1);
   ServeOptions options;
-  options.server = Server();
+  options.connection.server = Server();
   options.max_chunk = 100;
   Eigen::Index most = 0;
   SpoiledOracle counting(*torus);
@@ -62,7 +62,7 @@ TEST_F(Workers, AProgramJoinsAMeshByItsName) {
   EXPECT_GT(most, 1);
   EXPECT_LE(most, 100);
   DownloadOptions download;
-  download.server = Server();
+  download.connection.server = Server();
   const Expected<Mesh> mesh = DownloadMesh(name, download);
   ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
   EXPECT_TRUE(AreIdentical(*undisturbed, *mesh));
@@ -76,7 +76,7 @@ TEST_F(Workers, WhoDoesNotSuitAMeshLeavesItAlone) {
   const auto torus = Make("torus:1:0.4"), circle = Make("sphere:1"), cube = Make("tanglecube");
   const std::string name = Declared(*torus, 0.1);
   ServeOptions options;
-  options.server = Server();
+  options.connection.server = Server();
   const auto refused = [&](Oracle& oracle, const std::string& mesh, const char* words,
                            const char* reason = "INVALID_ARGUMENT") {
     const Expected<MeshState> state = ServeMesh(oracle, mesh, options);
@@ -98,7 +98,7 @@ TEST_F(Workers, WhoDoesNotSuitAMeshLeavesItAlone) {
   leaving.on_closest = [&stop](const Eigen::MatrixXd&, Answer&) { stop.request_stop(); };
   const Expected<MeshState> left = ServeMesh(leaving, name, options);
   ASSERT_FALSE(left.has_value());
-  EXPECT_EQ(left.error().reason, "CANCELLED");
+  EXPECT_EQ(left.error().code, ErrorCode::kStopped);
   options.stop = {};
   const Expected<MeshState> state = ServeMesh(*torus, name, options);
   ASSERT_TRUE(state.has_value()) << state.error().message;
@@ -146,7 +146,7 @@ TEST_F(Workers, TenThousandVerticesInAtMostFortyFiveRoundTrips) {
 }
 
 TEST(EmbeddedDefault, NeedsNoServerAndLeavesNoneBehind) {
-  const auto circle = MakeManifold("circle:3", nullptr);
+  const auto circle = MakeManifold("circle:3").value();
   MeshOptions options;
   options.epsilon = 0.3;
   const Expected<Mesh> mesh = MeshManifold(*circle, options);
@@ -160,9 +160,9 @@ TEST(EmbeddedDefault, StopsItsServer) {
     const auto server = client::EmbeddedServer::Start();
     ASSERT_TRUE(server.has_value()) << server.error().message;
     address = (*server)->address();
-    EXPECT_TRUE(CheckHealth(address).has_value());
+    EXPECT_TRUE(CheckHealth({address}).has_value());
   }
-  EXPECT_FALSE(CheckHealth(address).has_value());
+  EXPECT_FALSE(CheckHealth({address}).has_value());
 }
 
 }  // namespace

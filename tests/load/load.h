@@ -6,6 +6,7 @@
 
 #include "stellate/catalogue.h"
 #include "stellate/client.h"
+#include "tests/support/make_manifold.h"
 
 namespace stellate::load {
 
@@ -26,8 +27,7 @@ class Stopwatch {
   std::chrono::steady_clock::time_point begin_ = std::chrono::steady_clock::now();
 };
 
-// Of the catalogue.
-std::unique_ptr<Manifold> Make(const std::string& spec);
+using testing::Make;
 // Ends the program if there is none.
 Mesh MeshOn(const std::string& server, const std::string& manifold, double epsilon, int workers);
 bool AreIdentical(const Mesh& a, const Mesh& b);

@@ -35,18 +35,11 @@ double Slope(const std::vector<Sample>& samples) {
 
 }  // namespace
 
-std::unique_ptr<Manifold> Make(const std::string& spec) {
-  std::string error;
-  auto manifold = MakeManifold(spec, &error);
-  if (manifold == nullptr) Die(error);
-  return manifold;
-}
-
 Mesh MeshOn(const std::string& server, const std::string& manifold, double epsilon, int workers) {
   const auto oracle = Make(manifold);
   MeshOptions options;
   options.epsilon = epsilon;
-  options.server = server;
+  options.connection.server = server;
   options.workers = workers;
   auto mesh = MeshManifold(*oracle, options);
   if (!mesh) Die(manifold + ": " + mesh.error().message);

@@ -114,12 +114,12 @@ std::unique_ptr<Oracle> TurnedTorus() {
     rotation = turn * rotation;
   }
   Similarity map{rotation.leftCols(3), 2, Vector::LinSpaced(5, 0, 4)};
-  return std::make_unique<Transformed>(MakeManifold("torus:1:0.4", nullptr), map);
+  return std::make_unique<Transformed>(MakeManifold("torus:1:0.4").value(), map);
 }
 
 std::unique_ptr<Oracle> CurveOnTorus() {
   const auto f = [](const Vector& x) { return Vector::Constant(1, x[0] - 0.3 * x[2] - 0.1); };
-  return std::make_unique<LevelSet>(MakeManifold("torus:1:0.4", nullptr), f);
+  return std::make_unique<LevelSet>(MakeManifold("torus:1:0.4").value(), f);
 }
 
 // A Clifford torus by two constraints, one with its gradient.
@@ -145,7 +145,7 @@ std::unique_ptr<Oracle> FourBars() {
 
 std::unique_ptr<Oracle> TorusTimesCircle() {
   return std::make_unique<Product>(std::vector<std::shared_ptr<Oracle>>{
-      MakeManifold("torus:1:0.4", nullptr), MakeManifold("sphere:1", nullptr)});
+      MakeManifold("torus:1:0.4").value(), MakeManifold("sphere:1").value()});
 }
 
 const std::map<std::string, std::function<std::unique_ptr<Oracle>()>>& Makers() {

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "core/mesher.h"
-#include "stellate/catalogue.h"
 #include "stellate/oracle.h"
+#include "tests/support/make_manifold.h"
 
 namespace stellate::testing {
 
@@ -93,9 +93,7 @@ inline FinishedRun RunMesher(Oracle& oracle, core::Specification spec) {
 
 // Meshes a manifold of the catalogue.
 inline FinishedRun RunMesher(const std::string& manifold, double epsilon) {
-  std::string error;
-  const std::unique_ptr<Manifold> oracle = MakeManifold(manifold, &error);
-  if (oracle == nullptr) throw std::runtime_error(error);
+  const std::unique_ptr<Manifold> oracle = Make(manifold);
   return RunMesher(*oracle, SpecificationFor(*oracle, epsilon));
 }
 

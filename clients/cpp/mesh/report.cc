@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "mesh/write_file.h"
+#include "stellate/version.h"
 
 namespace stellate {
 namespace {

@@ -8,6 +8,7 @@
 
 #include "mesh/formats.h"
 #include "mesh/groups.h"
+#include "stellate/version.h"
 
 namespace stellate::client {
 namespace {

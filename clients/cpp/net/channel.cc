@@ -88,21 +88,19 @@ constexpr int Milliseconds(double seconds) { return static_cast<int>(1000 * seco
 
 }  // namespace
 
-const double kUsualKeepalive = reconnect::kKeepalive;
 const std::chrono::milliseconds kCallTime{Milliseconds(reconnect::kCall)};
 
-Expected<std::shared_ptr<grpc::Channel>> Connect(const std::string& server,
-                                                 const Credentials& credentials,
-                                                 double keepalive_seconds) {
+Expected<std::shared_ptr<grpc::Channel>> Connect(const Connection& connection) {
+  const Credentials& credentials = connection.credentials;
   const auto security = Security(credentials);
   if (!security) return tl::unexpected(security.error());
   std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> interceptors;
   if (!credentials.token.empty()) {
     const bool plain =
         !credentials.tls && credentials.tls_ca.empty() && credentials.tls_certificate.empty();
-    if (plain && !StaysOnThisMachine(server)) {
+    if (plain && !StaysOnThisMachine(connection.server)) {
       return Fail(ErrorCode::kRefused,
-                  "the token would go to " + server +
+                  "the token would go to " + connection.server +
                       " in plain text, for others to read and use: turn TLS on");
     }
     interceptors.push_back(std::make_unique<SendTokenFactory>(credentials.token));
@@ -110,7 +108,7 @@ Expected<std::shared_ptr<grpc::Channel>> Connect(const std::string& server,
   KeepGrpc();
   grpc::ChannelArguments arguments;
   // Streams are quiet while the other side computes: pings find a peer that froze or vanished.
-  const int ping = std::max(1, Milliseconds(std::min(keepalive_seconds, kNoPings)));
+  const int ping = std::max(1, Milliseconds(std::min(connection.keepalive, kNoPings).count()));
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIME_MS, ping);
   arguments.SetInt(GRPC_ARG_KEEPALIVE_TIMEOUT_MS,
                    static_cast<int>(reconnect::kPingPatience * ping));
@@ -122,8 +120,8 @@ Expected<std::shared_ptr<grpc::Channel>> Connect(const std::string& server,
                    Milliseconds(reconnect::kFirstConnectionPause));
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS,
                    Milliseconds(reconnect::kLongestConnectionPause));
-  return grpc::experimental::CreateCustomChannelWithInterceptors(server, *security, arguments,
-                                                                 std::move(interceptors));
+  return grpc::experimental::CreateCustomChannelWithInterceptors(
+      connection.server, *security, arguments, std::move(interceptors));
 }
 
 void KeepGrpc() {

@@ -6,19 +6,15 @@
 #include <memory>
 #include <string>
 
-#include "stellate/client.h"
+#include "stellate/connection.h"
 #include "stellate/error.h"
 
 namespace stellate::client {
 
-// A channel to the server that sends the token, if there is one, with every call. A server that was
-// silent for `keepalive_seconds` is pinged, and counts as lost when it takes twice as long to
-// answer. kRefused: a file that cannot be read, or a token that others could read on its way.
-extern const double kUsualKeepalive;
-inline constexpr double kNoPings = 1e6;
-Expected<std::shared_ptr<grpc::Channel>> Connect(const std::string& server,
-                                                 const Credentials& credentials,
-                                                 double keepalive_seconds = kUsualKeepalive);
+// A channel to connection.server that sends the token, if there is one, with every call. kRefused:
+// a file that cannot be read, or a token that others could read on its way.
+inline constexpr Seconds kNoPings{1e6};  // as Connection::keepalive
+Expected<std::shared_ptr<grpc::Channel>> Connect(const Connection& connection);
 
 // For a unary call, connecting included.
 extern const std::chrono::milliseconds kCallTime;

@@ -11,7 +11,6 @@ namespace stellate::client {
 namespace {
 
 using Clock = std::chrono::steady_clock;
-using Seconds = std::chrono::duration<double>;
 
 }  // namespace
 
@@ -59,7 +58,7 @@ grpc::ClientContext& Reconnector::Attempt() {
 
 void Reconnector::Heard() {
   if (attempts_ == 0) return;
-  const Outage outage{true, Seconds(Clock::now() - lost_).count(), attempts_, ""};
+  const Outage outage{true, Clock::now() - lost_, attempts_, ""};
   attempts_ = 0;
   backoff_.Reset();
   if (policy_.on_outage) policy_.on_outage(outage);
@@ -74,7 +73,7 @@ bool Reconnector::Again(const grpc::Status& status) {
   if (left <= Seconds(0) || stopped()) return false;
   ++attempts_;
   if (policy_.on_outage) {
-    policy_.on_outage({false, Seconds(now - lost_).count(), attempts_, status.error_message()});
+    policy_.on_outage({false, now - lost_, attempts_, status.error_message()});
   }
   if (!Pause(std::min(backoff_.Next(), left))) return false;
   Connect();

@@ -12,7 +12,8 @@
 #include <optional>
 #include <random>
 
-#include "stellate/client.h"
+#include "stellate/connection.h"
+#include "stellate/error.h"
 
 namespace stellate::client {
 
@@ -28,18 +29,18 @@ Error Explain(const grpc::Status& status, bool reconnecting);
 class Backoff {
  public:
   explicit Backoff(std::uint64_t random_seed) : random_(random_seed) {}
-  std::chrono::duration<double> Next();
+  Seconds Next();
   void Reset() { next_ = kFirst; }
 
-  static const std::chrono::duration<double> kFirst, kLongest;
+  static const Seconds kFirst, kLongest;
 
  private:
-  std::chrono::duration<double> next_ = kFirst;
+  Seconds next_ = kFirst;
   std::mt19937_64 random_;
 };
 
 struct ReconnectPolicy {
-  std::chrono::duration<double> give_up{0};      // without a sign of life for so long
+  Seconds give_up{0};                            // without a sign of life for so long
   std::shared_ptr<grpc::Channel> channel;        // of the streams; may be null
   std::function<bool()> hopeless;                // true: it will not come back; may be empty
   std::function<void(const Outage&)> on_outage;  // called by Again and Heard; may be empty
@@ -58,7 +59,7 @@ class Reconnector {
   // After an attempt ended with `status`: waits, and says whether to make another.
   bool Again(const grpc::Status& status);
   // Waits; false when it was stopped.
-  bool Pause(std::chrono::duration<double> pause);
+  bool Pause(Seconds pause);
   // Whether the last attempt follows on one that was broken off.
   bool reconnecting() const { return attempts_ > 0; }
 

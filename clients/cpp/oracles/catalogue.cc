@@ -210,7 +210,7 @@ Eigen::MatrixXd Frame(int d, int inner) {
 
 }  // namespace
 
-std::unique_ptr<Manifold> MakeManifold(const std::string& spec, std::string* error) {
+Expected<std::unique_ptr<Manifold>> MakeManifold(const std::string& spec) {
   try {
     const Parsed parsed = Parse(spec);
     Built built = Build(parsed);
@@ -236,8 +236,7 @@ std::unique_ptr<Manifold> MakeManifold(const std::string& spec, std::string* err
     if (turned) frame = Frame(d, inner);
     return std::make_unique<Manifold>(std::move(built.shape), std::move(facts), std::move(frame));
   } catch (const std::invalid_argument& failure) {
-    if (error != nullptr) *error = "manifold '" + spec + "': " + failure.what();
-    return nullptr;
+    return stellate::Fail(ErrorCode::kRefused, "manifold '" + spec + "': " + failure.what());
   }
 }
 

@@ -19,19 +19,19 @@ Expected<Mesh> MeshManifold(Oracle& oracle, const MeshOptions& options) {
   Expected<client::Request> request = client::Settle(oracle, options);
   if (!request) return tl::unexpected(request.error());
   std::unique_ptr<client::EmbeddedServer> embedded;
-  std::string server = options.server;
-  if (server.empty()) {
+  Connection connection = options.connection;
+  if (connection.server.empty()) {
     auto started = client::EmbeddedServer::Start();
     if (!started) return tl::unexpected(started.error());
     embedded = std::move(*started);
-    server = embedded->address();
+    connection.server = embedded->address();
+    connection.credentials = {};
+    // Pings would show nothing: the end of one's own server shows immediately.
+    connection.keepalive = client::kNoPings;
   }
-  // One's own server on the same machine needs no pings: its end shows at once.
-  const auto channel =
-      embedded ? client::Connect(server, {}, client::kNoPings)
-               : client::Connect(server, options.credentials, options.keepalive_seconds);
+  const auto channel = client::Connect(connection);
   if (!channel) return tl::unexpected(channel.error());
-  for (int retries = options.auto_epsilon ? doctor::kAutoRetries : 0;; --retries) {
+  for (int retries = options.epsilon == kAuto ? doctor::kAutoRetries : 0;; --retries) {
     client::Run run(*channel, oracle, request->options,
                     [&embedded] { return embedded && !embedded->alive(); });
     Expected<Mesh> mesh = run.Go();
@@ -44,11 +44,10 @@ Expected<Mesh> MeshManifold(Oracle& oracle, const MeshOptions& options) {
   }
 }
 
-Expected<ServerHealth> CheckHealth(const std::string& server, double timeout_seconds,
-                                   const Credentials& credentials) {
-  Expected<Monitor> monitor = Monitor::Connect(server, credentials);
+Expected<ServerHealth> CheckHealth(const Connection& connection, Seconds timeout) {
+  Expected<Monitor> monitor = Monitor::Connect(connection);
   if (!monitor) return tl::unexpected(monitor.error());
-  return monitor->Health(timeout_seconds);
+  return monitor->Health(timeout);
 }
 
 }  // namespace stellate

@@ -13,16 +13,14 @@ namespace client {
 
 Expected<Request> Settle(Oracle& oracle, const MeshOptions& options) {
   Request request{options, ""};
-  if (options.auto_epsilon) {
-    if (options.epsilon != 0) {
-      return Fail(ErrorCode::kRefused, "epsilon is given and auto_epsilon set: choose one");
-    }
+  if (options.epsilon == kAuto) {
     Expected<ChosenEpsilon> chosen = ChooseEpsilon(oracle);
     if (!chosen) return tl::unexpected(chosen.error());
     Take(*chosen, &request);
   }
   // Round trips are what a far server costs.
-  const bool far = !options.server.empty() && !StaysOnThisMachine(options.server);
+  const bool far =
+      !options.connection.server.empty() && !StaysOnThisMachine(options.connection.server);
   if (!options.speculative && far) request.options.speculative = true;
   return request;
 }
@@ -50,11 +48,10 @@ Expected<std::string> CreateMesh(v1::Stellate::Stub& stub, Oracle& oracle,
 }  // namespace client
 
 Expected<std::string> DeclareMesh(Oracle& oracle, const MeshOptions& options) {
-  if (options.server.empty()) {
+  if (options.connection.server.empty()) {
     return Fail(ErrorCode::kRefused, "no server is given: say where the mesh is to be");
   }
-  const auto channel =
-      client::Connect(options.server, options.credentials, options.keepalive_seconds);
+  const auto channel = client::Connect(options.connection);
   if (!channel) return tl::unexpected(channel.error());
   const Expected<client::Request> request = client::Settle(oracle, options);
   if (!request) return tl::unexpected(request.error());

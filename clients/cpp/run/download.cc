@@ -32,8 +32,8 @@ class Download {
       : stub_(v1::Stellate::NewStub(channel)),
         name_(name),
         options_(options),
-        attempts_({std::chrono::duration<double>(options.reconnect_seconds), channel,
-                   /*hopeless=*/{}, options.on_outage}) {}
+        attempts_({options.connection.reconnect, channel,
+                   /*hopeless=*/{}, options.connection.on_outage}) {}
 
   Expected<Mesh> Go() {
     const std::stop_callback cancel(options_.stop, [this] { attempts_.Stop(); });
@@ -151,7 +151,7 @@ class Download {
 
   Error Lost(const grpc::Status& status) const {
     if (options_.stop.stop_requested()) {
-      return {ErrorCode::kServerFailed, "CANCELLED", "the download was cancelled"};
+      return {ErrorCode::kStopped, "", "the download was stopped"};
     }
     if (status.ok()) return BrokenProtocol("the end of its stream too early");
     return attempts_.Lost(status);
@@ -187,11 +187,10 @@ class Download {
 }  // namespace client
 
 Expected<Mesh> DownloadMesh(const std::string& name, const DownloadOptions& options) {
-  if (options.server.empty()) {
+  if (options.connection.server.empty()) {
     return Fail(ErrorCode::kRefused, "no server is given: say where the mesh is");
   }
-  const auto channel =
-      client::Connect(options.server, options.credentials, options.keepalive_seconds);
+  const auto channel = client::Connect(options.connection);
   if (!channel) return tl::unexpected(channel.error());
   return client::Download(*channel, name, options).Go();
 }

@@ -21,10 +21,9 @@ namespace {
 using client::FromStatus;
 using Deadline = std::chrono::system_clock::time_point;
 
-Deadline After(double seconds) {
+Deadline After(Seconds wait) {
   return std::chrono::system_clock::now() +
-         std::chrono::duration_cast<std::chrono::system_clock::duration>(
-             std::chrono::duration<double>(seconds));
+         std::chrono::duration_cast<std::chrono::system_clock::duration>(wait);
 }
 
 }  // namespace
@@ -123,26 +122,24 @@ Monitor::Monitor(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
 Monitor::Monitor(Monitor&&) noexcept = default;
 Monitor::~Monitor() = default;
 
-Expected<Monitor> Monitor::Connect(const std::string& server, const Credentials& credentials) {
-  const auto channel = client::Connect(server, credentials);
+Expected<Monitor> Monitor::Connect(const Connection& connection) {
+  const auto channel = client::Connect(connection);
   if (!channel) return tl::unexpected(channel.error());
   return Monitor(std::make_unique<Impl>(*channel));
 }
 
-Expected<ServerHealth> Monitor::Health(double timeout_seconds) {
-  return impl_->Health(After(timeout_seconds));
+Expected<ServerHealth> Monitor::Health(Seconds timeout) { return impl_->Health(After(timeout)); }
+
+Expected<std::vector<MeshStatus>> Monitor::Meshes(Seconds timeout) {
+  return impl_->Meshes(After(timeout));
 }
 
-Expected<std::vector<MeshStatus>> Monitor::Meshes(double timeout_seconds) {
-  return impl_->Meshes(After(timeout_seconds));
+Expected<void> Monitor::Cancel(const std::string& name, Seconds timeout) {
+  return impl_->Cancel(name, After(timeout));
 }
 
-Expected<void> Monitor::Cancel(const std::string& name, double timeout_seconds) {
-  return impl_->Cancel(name, After(timeout_seconds));
-}
-
-Expected<void> Monitor::Delete(const std::string& name, double timeout_seconds) {
-  return impl_->Delete(name, After(timeout_seconds));
+Expected<void> Monitor::Delete(const std::string& name, Seconds timeout) {
+  return impl_->Delete(name, After(timeout));
 }
 
 }  // namespace stellate

@@ -29,7 +29,7 @@ Run::Run(const std::shared_ptr<grpc::Channel>& channel, Oracle& oracle, const Me
       options_(options),
       hopeless_(std::move(hopeless)) {
   ReconnectPolicy policy = Policy();
-  policy.on_outage = options.on_outage;
+  policy.on_outage = options.connection.on_outage;
   watch_ = std::make_unique<Reconnector>(std::move(policy));
 }
 
@@ -48,7 +48,7 @@ Run::~Run() {
 }
 
 ReconnectPolicy Run::Policy() const {
-  return {std::chrono::duration<double>(options_.reconnect_seconds), channel_, hopeless_, {}};
+  return {options_.connection.reconnect, channel_, hopeless_, {}};
 }
 
 Expected<Mesh> Run::Go() {

@@ -51,7 +51,6 @@ void NoteEnd(const v1::ServeOracleResponse& response, std::optional<MeshState>* 
   *state = FromProto(parsed);
 }
 
-using Seconds = std::chrono::duration<double>;
 using Stream = grpc::ClientReaderWriterInterface<v1::ServeOracleRequest, v1::ServeOracleResponse>;
 
 // What is sent to the server. While the oracle is at a chunk another thread says so now and then,

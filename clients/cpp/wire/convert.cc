@@ -149,9 +149,9 @@ Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
   if (options.max_vertices) limits.set_max_vertices(*options.max_vertices);
   if (options.max_rounds) limits.set_max_rounds(*options.max_rounds);
   if (options.max_batch_queries) limits.set_max_batch_queries(*options.max_batch_queries);
-  if (options.worker_wait_seconds) limits.set_worker_wait_seconds(*options.worker_wait_seconds);
-  if (options.answer_seconds) limits.set_answer_seconds(*options.answer_seconds);
-  if (options.busy_seconds) limits.set_busy_seconds(*options.busy_seconds);
+  if (options.worker_wait) limits.set_worker_wait_seconds(options.worker_wait->count());
+  if (options.answer_time) limits.set_answer_seconds(options.answer_time->count());
+  if (options.busy_time) limits.set_busy_seconds(options.busy_time->count());
   if (options.box_seeds) spec.set_box_seeds(*options.box_seeds);
   if (options.components) spec.set_components(*options.components);
   if (options.thorough_audit) spec.set_audit(v1::AUDIT_THOROUGH);

@@ -46,7 +46,7 @@ class Demo::Impl {
     auto server = client::EmbeddedServer::Start();
     if (!server) return tl::unexpected(server.error());
     server_ = std::move(*server);
-    const auto channel = client::Connect(server_->address(), {});
+    const auto channel = client::Connect({server_->address()});
     if (!channel) return tl::unexpected(channel.error());
     stub_ = v1::Stellate::NewStub(*channel);
     return {};
@@ -71,16 +71,15 @@ class Demo::Impl {
   }
 
   Expected<void> Show(const Exhibit& exhibit, const std::stop_token& stop) {
-    std::string why;
-    const auto manifold = MakeManifold(exhibit.manifold, &why);
-    if (manifold == nullptr) return Fail(ErrorCode::kRefused, why);
-    const Expected<std::string> name = Declare(*manifold, exhibit);
+    const auto manifold = MakeManifold(exhibit.manifold);
+    if (!manifold) return tl::unexpected(manifold.error());
+    const Expected<std::string> name = Declare(**manifold, exhibit);
     if (!name) return tl::unexpected(name.error());
     ServeOptions options;
-    options.server = server();
+    options.connection.server = server();
     options.worker = "stellate view --demo";
     options.stop = stop;
-    const Expected<MeshState> state = ServeMesh(*manifold, *name, options);
+    const Expected<MeshState> state = ServeMesh(**manifold, *name, options);
     if (!state && !stop.stop_requested()) return tl::unexpected(state.error());
     return {};
   }

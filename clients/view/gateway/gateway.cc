@@ -130,13 +130,13 @@ class Visit : public std::enable_shared_from_this<Visit> {
 class Gateway::Impl {
  public:
   explicit Impl(GatewayOptions options) : shared_(options.port), options_(std::move(options)) {
-    shared_.title = options_.title.empty() ? options_.server : options_.title;
+    shared_.title = options_.title.empty() ? options_.connection.server : options_.title;
     shared_.mesh = options_.mesh;
   }
 
   Expected<void> Listen() {
     if (const auto page = Page(); !page) return tl::unexpected(page.error());
-    const auto channel = client::Connect(options_.server, options_.credentials);
+    const auto channel = client::Connect(options_.connection);
     if (!channel) return tl::unexpected(channel.error());
     shared_.stub = std::make_unique<grpc::GenericStub>(*channel);
     error_code error;

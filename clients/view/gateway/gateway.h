@@ -5,14 +5,13 @@
 #include <stop_token>
 #include <string>
 
-#include "stellate/client.h"
+#include "stellate/connection.h"
 #include "stellate/error.h"
 
 namespace stellate::view {
 
 struct GatewayOptions {
-  std::string server;  // "host:port" or "unix:/path"
-  Credentials credentials;
+  Connection connection;
   std::string title;       // of the server, for people; empty: its address
   std::string mesh;        // shown first; empty: the newest
   std::uint16_t port = 0;  // on the loopback; 0: any that is free

@@ -119,8 +119,7 @@ class Recorder {
     }
     if (IsTooLarge()) context.TryCancel();
     const grpc::Status status = stream->Finish();
-    if (options_.stop.stop_requested())
-      return Fail(ErrorCode::kServerFailed, "nothing was written", "CANCELLED");
+    if (options_.stop.stop_requested()) return Fail(ErrorCode::kStopped, "nothing was written");
     if (patience.IsOver()) {
       return Fail(ErrorCode::kServerFailed,
                   "the server said nothing for " + std::to_string(kSilence.count()) + " seconds",
@@ -226,7 +225,7 @@ class Recorder {
 Expected<void> WriteRecording(const std::string& mesh, const std::string& path,
                               const RecordOptions& options) {
   if (auto ok = client::CheckWrite(path); !ok) return ok;
-  const auto channel = client::Connect(options.server, options.credentials);
+  const auto channel = client::Connect(options.connection);
   if (!channel) return tl::unexpected(channel.error());
   const Expected<std::string> recording = Recorder(*channel, mesh, options).Go();
   if (!recording) return tl::unexpected(recording.error());

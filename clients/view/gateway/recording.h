@@ -4,14 +4,13 @@
 #include <stop_token>
 #include <string>
 
-#include "stellate/client.h"
+#include "stellate/connection.h"
 #include "stellate/error.h"
 
 namespace stellate::view {
 
 struct RecordOptions {
-  std::string server;
-  Credentials credentials;
+  Connection connection;
   std::function<void(const Progress&)> on_progress;  // while the mesh is waited for
   std::stop_token stop;
 };

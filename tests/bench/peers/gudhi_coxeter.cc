@@ -14,9 +14,9 @@
 #include <stdexcept>
 #include <unordered_map>
 
-#include "stellate/catalogue.h"
 #include "tests/bench/peers/peer.h"
 #include "tests/bench/peers/quality.h"
+#include "tests/support/make_manifold.h"
 
 namespace stellate::bench {
 namespace {
@@ -139,9 +139,7 @@ class Pulling {
 }  // namespace
 
 Outcome MeshWithGudhiCoxeter(const Task& task, Meter& meter) {
-  std::string error;
-  const std::unique_ptr<Manifold> manifold = MakeManifold(task.manifold, &error);
-  if (manifold == nullptr) throw std::runtime_error(error);
+  const std::unique_ptr<Manifold> manifold = testing::Make(task.manifold);
   const int d = std::max(task.ambient_dimension, manifold->ambient_dimension());
   const int k = manifold->dimension();
 

@@ -13,8 +13,8 @@
 #include <random>
 #include <stdexcept>
 
-#include "stellate/catalogue.h"
 #include "tests/bench/peers/peer.h"
+#include "tests/support/make_manifold.h"
 
 namespace stellate::bench {
 namespace {
@@ -120,9 +120,7 @@ Outcome Run(Manifold& manifold, const Task& task, Meter& meter) {
 }  // namespace
 
 Outcome MeshWithGudhiTangential(const Task& task, Meter& meter) {
-  std::string error;
-  const std::unique_ptr<Manifold> manifold = MakeManifold(task.manifold, &error);
-  if (manifold == nullptr) throw std::runtime_error(error);
+  const std::unique_ptr<Manifold> manifold = testing::Make(task.manifold);
   const int d = manifold->ambient_dimension(), k = manifold->dimension();
   if (d == 4 && k == 2) return Run<4, 2>(*manifold, task, meter);
   if (d == 4 && k == 3) return Run<4, 3>(*manifold, task, meter);

@@ -14,9 +14,9 @@
 #include <stdexcept>
 #include <string>
 
-#include "stellate/catalogue.h"
 #include "tests/bench/peers/peer.h"
 #include "tests/bench/peers/quality.h"
+#include "tests/support/make_manifold.h"
 
 namespace stellate::bench {
 namespace {
@@ -79,8 +79,7 @@ int Main(int argc, char** argv) {
   const Outcome outcome = program->second(task, meter);
   if (outcome.simplices.empty()) throw std::runtime_error("no simplices: " + outcome.note);
   const std::size_t corners = [&] {
-    std::string error;
-    const auto manifold = MakeManifold(task.manifold, &error);
+    const auto manifold = testing::Make(task.manifold);
     return static_cast<std::size_t>(manifold->dimension()) + 1;
   }();
   std::printf(
@@ -94,8 +93,7 @@ int Main(int argc, char** argv) {
       static_cast<unsigned long long>(outcome.evaluations),
       static_cast<long long>(meter.peak_bytes()), Quoted(outcome.note).c_str());
   if (with_quality) {
-    std::string error;
-    const auto manifold = MakeManifold(task.manifold, &error);
+    const auto manifold = testing::Make(task.manifold);
     const Quality quality = MeasureQuality(*manifold, outcome.points, outcome.simplices, task.clip);
     std::printf(
         ", \"hausdorff\": %.6g, \"min_angle_degrees\": %.6g, \"min_fatness\": %.6g, "

@@ -6,19 +6,15 @@
 #include <memory>
 #include <string>
 
+#include "tests/support/make_manifold.h"
+
 // The yardstick of the comparison, compared with meshes that are known completely.
 
 namespace stellate::bench {
 namespace {
 
+using testing::Make;
 using Simplices = std::vector<std::uint32_t>;
-
-std::unique_ptr<Manifold> Make(const std::string& spec) {
-  std::string error;
-  auto manifold = MakeManifold(spec, &error);
-  EXPECT_NE(manifold, nullptr) << error;
-  return manifold;
-}
 
 // The vertices at plus and minus the unit vectors of R^d, padded with zeros to R^D.
 Eigen::MatrixXd CrossPolytopeVertices(int d, int padded_to) {

@@ -3,18 +3,16 @@
 #include <vector>
 
 #include "core/mesher.h"
-#include "stellate/catalogue.h"
 #include "stellate/oracles/walls.h"
 #include "tests/bench/peers/peer.h"
 #include "tests/bench/peers/quality.h"
+#include "tests/support/make_manifold.h"
 #include "tests/support/run_mesher.h"
 
 namespace stellate::bench {
 
 Outcome MeshWithStellate(const Task& task, Meter& meter) {
-  std::string error;
-  const std::shared_ptr<Manifold> manifold = MakeManifold(task.manifold, &error);
-  if (manifold == nullptr) throw std::runtime_error(error);
+  const std::shared_ptr<Manifold> manifold = testing::Make(task.manifold);
   std::shared_ptr<Oracle> oracle = manifold;
   if (task.clip) {
     oracle = std::make_shared<oracles::Clipped>(

@@ -9,20 +9,16 @@
 #include <string>
 #include <vector>
 
+#include "support/make_manifold.h"
 #include "support/oracle_invariants.h"
 
 namespace stellate {
 namespace {
 
+using testing::Make;
+
 using testing::InvariantOptions;
 using testing::OracleInvariantsHold;
-
-std::unique_ptr<Manifold> Make(const std::string& spec) {
-  std::string error;
-  std::unique_ptr<Manifold> manifold = MakeManifold(spec, &error);
-  EXPECT_NE(manifold, nullptr) << error;
-  return manifold;
-}
 
 class EveryManifold : public ::testing::TestWithParam<std::string> {};
 
@@ -156,7 +152,7 @@ TEST(TurnedManifold, IsIsometricToTheOriginal) {
 
 // Rounds are cut into chunks as workers come and go, and the mesh must not show it.
 TEST(TurnedManifold, AnswersAloneAsInABatch) {
-  const auto manifold = MakeManifold("torus@20", nullptr);
+  const auto manifold = MakeManifold("torus@20").value();
   constexpr Eigen::Index kCount = 37;
   const Eigen::MatrixXd x = Eigen::MatrixXd::Random(20, kCount);
   const Eigen::MatrixXd points = manifold->ClosestPoint(x).points;
@@ -259,11 +255,11 @@ TEST(MakeManifold, RefusesWithAReason) {
                                  "circle:100000",
                                  "torus:1:0.4:3",
                                  "sphere:2:10@5"}) {
-    std::string error;
-    EXPECT_EQ(MakeManifold(spec, &error), nullptr) << spec;
-    EXPECT_NE(error.find("'" + spec + "'"), std::string::npos) << error;
+    const auto manifold = MakeManifold(spec);
+    ASSERT_FALSE(manifold.has_value()) << spec;
+    EXPECT_NE(manifold.error().message.find("'" + spec + "'"), std::string::npos)
+        << manifold.error().message;
   }
-  EXPECT_EQ(MakeManifold("nothing", nullptr), nullptr);
 }
 
 }  // namespace

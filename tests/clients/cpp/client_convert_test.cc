@@ -167,11 +167,11 @@ TEST(Spec, CarriesWhatTheOracleSaysOfItself) {
   for (int i = 0; i < 300; ++i) longest += "\u00e9";
   oracle.words = longest + "and more";
   EXPECT_EQ(ToSpec(oracle, {})->oracle().about(), longest) << "what a server takes";
-  EXPECT_EQ(ToSpec(*MakeManifold("torus", nullptr), {})->oracle().about(), "");
+  EXPECT_EQ(ToSpec(*MakeManifold("torus").value(), {})->oracle().about(), "");
 }
 
 TEST(Spec, CarriesWhatIsGivenAndNothingElse) {
-  const auto manifold = MakeManifold("torus", nullptr);
+  const auto manifold = MakeManifold("torus").value();
   MeshOptions options;
   options.epsilon = 0.25;
   const auto plain = ToSpec(*manifold, options);
@@ -181,7 +181,7 @@ TEST(Spec, CarriesWhatIsGivenAndNothingElse) {
   EXPECT_EQ(plain->epsilon(), 0.25);
   EXPECT_TRUE(plain->oracle().tangent_basis() && plain->oracle().intersect_flat());
   EXPECT_TRUE(plain->oracle().local_size());
-  EXPECT_FALSE(ToSpec(*MakeManifold("tanglecube", nullptr), options)->oracle().local_size());
+  EXPECT_FALSE(ToSpec(*MakeManifold("tanglecube").value(), options)->oracle().local_size());
   EXPECT_FALSE(plain->criteria().has_sliver_bound() || plain->criteria().has_candidates());
   EXPECT_EQ(plain->bounding_box().lower().shape(0), 3u);
   EXPECT_EQ(plain->bounding_box().lower().shape_size(), 1);
@@ -201,7 +201,7 @@ TEST(Spec, CarriesWhatIsGivenAndNothingElse) {
 }
 
 TEST(Spec, RefusesWhatTheWireCannotSay) {
-  const auto manifold = MakeManifold("torus", nullptr);
+  const auto manifold = MakeManifold("torus").value();
   MeshOptions options;
   options.workers = 0;
   const auto spec = ToSpec(*manifold, options);

@@ -93,7 +93,7 @@ class CommandOracle : public ::testing::Test {
 
 // Far more than pipes hold, in both directions at once: awk answers while it is still asked.
 TEST_F(CommandOracle, LargeBatchesAreAnsweredExactly) {
-  const auto torus = MakeManifold("torus:1:0.4", nullptr);
+  const auto torus = MakeManifold("torus:1:0.4").value();
   const Eigen::MatrixXd x = Eigen::MatrixXd::Random(3, 40'000);
   const Answer right = torus->ClosestPoint(x);
   for (const std::string& command :

@@ -32,7 +32,7 @@ void PrintTo(const Broken& broken, std::ostream* out) { *out << broken.code; }
 class BrokenOracle : public ::testing::TestWithParam<Broken> {};
 
 TEST_P(BrokenOracle, IsFoundOut) {
-  const auto torus = MakeManifold("torus:1:0.4", nullptr);
+  const auto torus = MakeManifold("torus:1:0.4").value();
   SpoiledOracle oracle(*torus);
   GetParam().spoil(oracle);
   const CheckReport report = Check(oracle);
@@ -177,7 +177,7 @@ INSTANTIATE_TEST_SUITE_P(
 class GoodOracle : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(GoodOracle, Passes) {
-  const auto manifold = MakeManifold(GetParam(), nullptr);
+  const auto manifold = MakeManifold(GetParam()).value();
   ASSERT_NE(manifold, nullptr);
   CheckOptions options;
   options.epsilon = 0.1;
@@ -204,7 +204,7 @@ std::vector<std::string> Examples() {
 INSTANTIATE_TEST_SUITE_P(Catalogue, GoodOracle, ::testing::ValuesIn(Examples()));
 
 TEST(Check, EpsilonIsComparedWithTheReach) {
-  const auto torus = MakeManifold("torus:1:0.4", nullptr);
+  const auto torus = MakeManifold("torus:1:0.4").value();
   CheckOptions options;
   options.epsilon = 0.3;
   const CheckReport coarse = Check(*torus, options);
@@ -218,7 +218,7 @@ TEST(Check, EpsilonIsComparedWithTheReach) {
 TEST(ChooseEpsilon, IsAQuarterOfTheReachWhateverTheUnit) {
   for (const auto& [spec, expected] :
        {std::pair("torus:1:0.4", 0.1), std::pair("torus:1000:400", 100.0)}) {
-    const auto manifold = MakeManifold(spec, nullptr);
+    const auto manifold = MakeManifold(spec).value();
     const auto chosen = ChooseEpsilon(*manifold);
     ASSERT_TRUE(chosen.has_value()) << chosen.error().message;
     EXPECT_NEAR(chosen->epsilon, expected, 0.05 * expected);
@@ -227,7 +227,7 @@ TEST(ChooseEpsilon, IsAQuarterOfTheReachWhateverTheUnit) {
 }
 
 TEST(ChooseEpsilon, RefusesAnOracleThatBreaksItsContract) {
-  const auto torus = MakeManifold("torus:1:0.4", nullptr);
+  const auto torus = MakeManifold("torus:1:0.4").value();
   SpoiledOracle oracle(*torus);
   oracle.on_closest = [](const Eigen::MatrixXd& x, Answer& a) { a.points = (a.points + x) / 2; };
   const auto chosen = ChooseEpsilon(oracle);
@@ -239,7 +239,7 @@ TEST(ChooseEpsilon, RefusesAnOracleThatBreaksItsContract) {
 }
 
 TEST(Check, ReadsWell) {
-  const auto torus = MakeManifold("torus:1:0.4", nullptr);
+  const auto torus = MakeManifold("torus:1:0.4").value();
   SpoiledOracle oracle(*torus);
   oracle.on_tangents = [](Eigen::MatrixXd& bases) { bases *= 1.01; };
   const std::string text = ToText(Check(oracle));

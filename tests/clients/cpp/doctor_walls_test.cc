@@ -21,7 +21,7 @@ using Eigen::MatrixXd, Eigen::VectorXd;
 using oracles::Ball, oracles::Box, oracles::Clipped, oracles::HalfSpace, oracles::Solid,
     oracles::Wall;
 
-std::shared_ptr<Oracle> Known(const std::string& spec) { return MakeManifold(spec, nullptr); }
+std::shared_ptr<Oracle> Known(const std::string& spec) { return MakeManifold(spec).value(); }
 VectorXd Up() { return VectorXd::Unit(3, 2); }
 
 // A sphere cut at z = -0.1, whose answers can be changed.
@@ -155,10 +155,9 @@ INSTANTIATE_TEST_SUITE_P(
 class GoodWalls : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(GoodWalls, Pass) {
-  std::string why;
-  const auto domain = oracles::MakeDomain(GetParam(), &why);
-  ASSERT_NE(domain, nullptr) << why;
-  const CheckReport report = Check(*domain);
+  const auto domain = oracles::MakeDomain(GetParam());
+  ASSERT_TRUE(domain.has_value()) << domain.error().message;
+  const CheckReport report = Check(**domain);
   const std::set<std::string> harmless = {"REACH", "PIECES", "SPEED", "SLOW", "NOT_CLOSEST_FAR"};
   for (const Finding& finding : report.findings) {
     EXPECT_EQ(harmless.count(finding.code), 1u) << ToText(report);
@@ -170,8 +169,7 @@ INSTANTIATE_TEST_SUITE_P(Catalogue, GoodWalls,
                                            "cube:2", "cylinder", "shell", "solid-torus"));
 
 TEST(Walls, TheReachOfABoundaryCounts) {
-  std::string why;
-  const auto ball = oracles::MakeDomain("ball", &why);
+  const auto ball = oracles::MakeDomain("ball").value();
   EXPECT_NEAR(*Check(*ball).reach, 1, 1e-6);
   Cut cut;
   EXPECT_NEAR(*Check(cut).reach, std::sqrt(0.99), 1e-6);

@@ -79,7 +79,7 @@ TEST_P(TakesFunctions, AndTellsSinglePrecision) {
   }
 }
 
-std::shared_ptr<Oracle> RoundTorus() { return MakeManifold("torus:1:0.4", nullptr); }
+std::shared_ptr<Oracle> RoundTorus() { return MakeManifold("torus:1:0.4").value(); }
 
 INSTANTIATE_TEST_SUITE_P(
     Ready, TakesFunctions,

@@ -38,7 +38,7 @@ Eigen::VectorXd CurveValue(const Eigen::VectorXd& x) {
 
 TEST(ImplicitOracle, AgreesWithTheClosedForm) {
   ImplicitOracle implicit(2, 3, TorusValue, TorusJacobian, Cube(3, 1.6));
-  const auto torus = MakeManifold("torus:1:0.4", nullptr);
+  const auto torus = MakeManifold("torus:1:0.4").value();
   // Within half the reach of the torus the closest point is unique.
   const Eigen::MatrixXd on = torus->ClosestPoint(Eigen::MatrixXd::Random(3, 300)).points;
   const Eigen::MatrixXd x = on + 0.2 / std::sqrt(3) * Eigen::MatrixXd::Random(3, 300);

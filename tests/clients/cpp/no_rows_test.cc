@@ -53,16 +53,15 @@ TEST(ReadyOracles, AnswerNoRowsWithNoRows) {
 }
 
 TEST(Walls, AnswerNoRowsWithNoRows) {
-  std::string why;
   for (const CatalogueEntry& entry : ListDomains()) {
     SCOPED_TRACE(entry.example);
-    AnswersNoRows(*MakeDomain(entry.example, &why));
+    AnswersNoRows(*MakeDomain(entry.example).value());
   }
   Similarity into_space{Eigen::MatrixXd::Identity(3, 2), 1, {}};
-  const auto rim = std::make_shared<Transformed>(MakeManifold("sphere:1", nullptr), into_space);
+  const auto rim = std::make_shared<Transformed>(MakeManifold("sphere:1").value(), into_space);
   for (const bool all : {true, false}) {
     const auto up = [](const Eigen::VectorXd& x) { return x[2]; };
-    ManifoldWithBoundary half(MakeManifold("sphere:2", nullptr), rim,
+    ManifoldWithBoundary half(MakeManifold("sphere:2").value(), rim,
                               all ? ManifoldWithBoundary::Clearance(up) : nullptr);
     AnswersNoRows(half);
   }
@@ -71,7 +70,7 @@ TEST(Walls, AnswerNoRowsWithNoRows) {
 TEST(Catalogue, AnswersNoRowsWithNoRows) {
   for (const CatalogueEntry& entry : ListManifolds()) {
     SCOPED_TRACE(entry.example);
-    AnswersNoRows(*MakeManifold(entry.example, nullptr));
+    AnswersNoRows(*MakeManifold(entry.example).value());
   }
 }
 

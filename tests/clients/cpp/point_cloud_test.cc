@@ -22,7 +22,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-std::unique_ptr<Manifold> Scanned() { return MakeManifold("torus:1:0.4", nullptr); }
+std::unique_ptr<Manifold> Scanned() { return MakeManifold("torus:1:0.4").value(); }
 
 // At random places of a torus, closer together towards one of its meridians.
 Eigen::MatrixXd ScanOf(int count, double noise, double crowding = 1) {
@@ -157,12 +157,12 @@ TEST(PointCloud, IsToldOfByWhatIsMadeOfIt) {
   const Similarity doubled{{}, 2, {}}, into_space{Eigen::MatrixXd::Identity(3, 2), 1, {}};
   EXPECT_EQ(Transformed(scan, doubled).about(), told + ", scaled by 2");
   EXPECT_EQ(Product({scan, scan, other}).about(), both);
-  const std::shared_ptr<Oracle> torus = MakeManifold("torus", nullptr);
+  const std::shared_ptr<Oracle> torus = MakeManifold("torus").value();
   EXPECT_EQ(Product({torus, scan}).about(), told);
   EXPECT_EQ(Transformed(torus, doubled).about(), "");
   const auto height = [](const Eigen::VectorXd& x) { return Eigen::VectorXd(x.tail(1)); };
   EXPECT_EQ(LevelSet(scan, height).about(), told);
-  const std::shared_ptr<Oracle> circle = MakeManifold("sphere:1", nullptr);
+  const std::shared_ptr<Oracle> circle = MakeManifold("sphere:1").value();
   const auto rim = std::make_shared<Transformed>(circle, into_space);
   EXPECT_EQ(ManifoldWithBoundary(scan, rim).about(), told);
 }

@@ -33,7 +33,7 @@ BoundingBox Cube(int d, double half) {
   return {Vector::Constant(d, -half), Vector::Constant(d, half)};
 }
 
-std::shared_ptr<Oracle> Torus() { return MakeManifold("torus:1:0.4", nullptr); }
+std::shared_ptr<Oracle> Torus() { return MakeManifold("torus:1:0.4").value(); }
 
 Eigen::MatrixXd Scattered(int d, int count, double half) {
   std::mt19937_64 random(5);

@@ -16,12 +16,10 @@
 namespace stellate::client {
 namespace {
 
-using Seconds = std::chrono::duration<double>;
-
 const grpc::Status kLost(grpc::StatusCode::UNAVAILABLE, "Socket closed");
 
 TEST(Connect, LeavesGrpcsOwnShutdownToTheEndOfTheProcess) {
-  ASSERT_TRUE(Connect("127.0.0.1:1", {}));
+  ASSERT_TRUE(Connect({"127.0.0.1:1"}));
   EXPECT_NE(grpc_is_initialized(), 0) << "the shutdown now and then waits for ten seconds";
 }
 
@@ -60,8 +58,8 @@ TEST(Backoff, DoublesToItsLimitAndDiffersFromClientToClient) {
 // The public headers, which are read without what is generated, repeat what all clients share.
 TEST(Defaults, AreThoseOfAllClients) {
   const auto are_shared = [](const auto& options) {
-    EXPECT_EQ(options.reconnect_seconds, reconnect::kGiveUp);
-    EXPECT_EQ(options.keepalive_seconds, reconnect::kKeepalive);
+    EXPECT_EQ(options.connection.reconnect, Seconds(reconnect::kGiveUp));
+    EXPECT_EQ(options.connection.keepalive, Seconds(reconnect::kKeepalive));
   };
   are_shared(MeshOptions());
   are_shared(ServeOptions());

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "tests/support/approximation.h"
+#include "tests/support/make_manifold.h"
 #include "tests/support/run_mesher.h"
 
 // The laws of Chapter 4 and the promises on cost, as exponents measured over a range of epsilon.
@@ -27,9 +28,7 @@ void PrintTo(const Range& range, std::ostream* out) { *out << range.manifold; }
 class Slopes : public ::testing::TestWithParam<Range> {};
 
 TEST_P(Slopes, FollowTheTheory) {
-  std::string error;
-  const std::unique_ptr<Manifold> manifold = MakeManifold(GetParam().manifold, &error);
-  ASSERT_NE(manifold, nullptr) << error;
+  const std::unique_ptr<Manifold> manifold = Make(GetParam().manifold);
 
   std::vector<double> vertices, hausdorff, angle;
   for (const double epsilon : GetParam().epsilons) {

@@ -12,9 +12,11 @@
 #include "core/base/basis_layout.h"
 #include "core/base/random.h"
 #include "core/complex/stars.h"
-#include "stellate/catalogue.h"
+#include "tests/support/make_manifold.h"
 
 namespace stellate::core::testing {
+
+using stellate::testing::Make;
 
 // Points of R^d with tangent bases as Stars wants them: k rows of d a point.
 struct FramedPoints {
@@ -39,13 +41,6 @@ struct FramedPoints {
     }
   }
 };
-
-inline std::unique_ptr<Manifold> Make(const std::string& name) {
-  std::string error;
-  std::unique_ptr<Manifold> manifold = MakeManifold(name, &error);
-  if (!manifold) throw std::runtime_error(error);
-  return manifold;
-}
 
 // Points of the manifold's box, sent to their closest points.
 inline Eigen::MatrixXd RandomPointsOn(Manifold& manifold, int count, std::uint64_t seed) {

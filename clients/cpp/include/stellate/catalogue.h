@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "stellate/error.h"
 #include "stellate/pointwise.h"
 
 namespace stellate {
@@ -53,8 +54,9 @@ class Manifold final : public Oracle {
 };
 
 // Makes "name:parameter:..." or "name:parameter:...@d", the latter turned into R^d by a rotation
-// that depends on the dimensions alone. On failure returns null and says why in `error`.
-std::unique_ptr<Manifold> MakeManifold(const std::string& spec, std::string* error);
+// that depends on the dimensions alone. kRefused: there is none of that name, or its parameters are
+// wrong.
+Expected<std::unique_ptr<Manifold>> MakeManifold(const std::string& spec);
 
 struct CatalogueEntry {
   std::string syntax;       // e.g. "torus[:R:r]"

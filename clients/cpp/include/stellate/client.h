@@ -7,51 +7,28 @@
 #include <string>
 #include <vector>
 
+#include "stellate/connection.h"
 #include "stellate/error.h"
 #include "stellate/mesh.h"
 #include "stellate/oracle.h"
 
 namespace stellate {
 
-// For a server that requires TLS or a token. Empty: plain text. Any tls_ file implies TLS.
-struct Credentials {
-  bool tls = false;                      // TLS, trusting the system's authorities
-  std::string tls_ca;                    // PEM file: trust these instead
-  std::string tls_certificate, tls_key;  // PEM files, for a server that asks for a certificate
-  std::string token;                     // over plain text only within this machine
-};
-
-// A server that went away: restarted, frozen, or cut off.
-struct Outage {
-  bool over = false;    // it is back, and the mesh goes on
-  double seconds = 0;   // since it was lost
-  int attempts = 0;     // at coming back to it
-  std::string message;  // how it was lost, in gRPC's words
-};
+// MeshOptions::epsilon: let ChooseEpsilon choose. If the mesh is too coarse to be certified, mesh
+// again, twice at most, with what its certificate shows.
+inline constexpr double kAuto = -1;
 
 // What to mesh and how. Absent values take the server's defaults; see mesh.proto for each.
 struct MeshOptions {
-  double epsilon = 0;  // largest circumradius of a simplex, a length; required, unless auto_epsilon
-  // Use ChooseEpsilon. If the mesh is too coarse to be certified, mesh again, twice at most, with
-  // what its certificate shows.
-  bool auto_epsilon = false;
-  // Called on the calling thread with each chosen epsilon; Report::epsilon_reason has the last
-  // reason.
+  double epsilon = 0;  // largest circumradius of a simplex, a length, or kAuto; required
+  // Called on the calling thread with each epsilon that kAuto chose; Report::epsilon_reason has the
+  // last reason.
   std::function<void(double epsilon, const std::string& reason)> on_epsilon;
 
-  // "host:port" or "unix:/path". Empty: a private stellated is started for this mesh and stopped
-  // after it; found by $STELLATED, next to the running program, or on PATH.
-  std::string server;
-  Credentials credentials;  // for `server`
-  // How long to wait for a server that goes away while it meshes; its streams are then opened again
-  // and continued. 0: do not wait. The server must record its meshes (stellated --data-dir). A
-  // server that cannot be reached at the start, or refuses, is an error without a wait.
-  double reconnect_seconds = 180;
-  // Called on the calling thread at every failed attempt to come back, and when it succeeded.
-  std::function<void(const Outage&)> on_outage;
-  // A server that is silent for so long is pinged, and lost if it does not answer in twice that
-  // time.
-  double keepalive_seconds = 4;
+  // Without a server: a private stellated is started for this mesh and stopped after it; found by
+  // $STELLATED, next to the running program, or on PATH. A server that is to be waited for while it
+  // is away must record its meshes (stellated --data-dir).
+  Connection connection;
   // How many threads answer, each with a stream of its own. They call the oracle in parallel.
   int workers = 1;
   // The most points in one call of the oracle. By default as many as take it a quarter of a
@@ -89,7 +66,7 @@ struct MeshOptions {
   std::optional<double> max_deviation;  // circumcentres at most so far from M, a length
   std::optional<bool> common_centre;    // test simplices at a centre common to their vertices
 
-  std::optional<double> worker_wait_seconds, answer_seconds, busy_seconds;
+  std::optional<Seconds> worker_wait, answer_time, busy_time;  // limits of the workers
   std::string label;  // shown in the server's lists and logs
 };
 
@@ -130,8 +107,7 @@ struct ServerHealth {
   double check_share = 0;  // of the queries, asked of two workers to compare the answers
 };
 
-// Asks a server for its health and limits. kServerFailed if none answers within `timeout_seconds`.
-Expected<ServerHealth> CheckHealth(const std::string& server, double timeout_seconds = 5,
-                                   const Credentials& credentials = {});
+// Asks a server for its health and limits. kServerFailed if none answers within `timeout`.
+Expected<ServerHealth> CheckHealth(const Connection& connection, Seconds timeout = Seconds(5));
 
 }  // namespace stellate

@@ -5,7 +5,7 @@
 #include <stop_token>
 #include <string>
 
-#include "stellate/client.h"
+#include "stellate/connection.h"
 #include "stellate/error.h"
 #include "stellate/mesh.h"
 
@@ -19,17 +19,11 @@ enum class Unfinished {
 };
 
 struct DownloadOptions {
-  std::string server;  // "host:port" or "unix:/path"; must be given
-  Credentials credentials;
+  Connection connection;  // its server must be given; a download resumes after an outage
   Unfinished unfinished = Unfinished::kRefuse;
   // Any revision that the mesh has had, however it ended; 0: the newest. Only the last revision of
   // a mesh that is over has a report.
   std::uint64_t revision = 0;
-  // How long to wait for a server that goes away; the download then resumes. 0: do not wait. A
-  // server that cannot be reached at the start is an error without a wait.
-  double reconnect_seconds = 180;
-  std::function<void(const Outage&)> on_outage;
-  double keepalive_seconds = 4;  // as in MeshOptions
   // Called with the mesh's dimensions before any wait or transfer. An error that it returns ends
   // the download.
   std::function<Expected<void>(int dimension, int ambient_dimension)> on_found;
@@ -37,7 +31,7 @@ struct DownloadOptions {
   // vertices and simplices received and those of the whole mesh.
   std::function<void(const Progress&)> on_progress;
   std::function<void(std::uint64_t received, std::uint64_t all)> on_part;
-  std::stop_token stop;  // ends it with an error; nothing happens to the mesh
+  std::stop_token stop;  // ends it with kStopped; nothing happens to the mesh
 };
 
 // Fetches a mesh from a server by its name ("meshes/<id>"). The server keeps it.

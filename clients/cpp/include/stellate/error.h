@@ -6,12 +6,18 @@
 
 namespace stellate {
 
+// How this library fails. A function whose work can fail returns Expected<T>. A constructor of a
+// ready oracle throws std::invalid_argument, since its arguments are the program's own; a call of
+// an oracle throws OracleError or what the user's function threw, and a mesh that it ends rethrows
+// that.
+
 // The kind of an error.
 enum class ErrorCode {
   kRefused,       // the request is invalid or asks for too much: correct it and try again
   kOracleFailed,  // the oracle answered wrongly, or not at all
   kServerFailed,  // no server was found, none answers, or the connection was lost
   kFileFailed,    // a file cannot be written, or its format cannot hold the mesh
+  kStopped,       // the caller's stop_token ended the call
 };
 
 struct Error {

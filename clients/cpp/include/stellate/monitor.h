@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "stellate/client.h"
+#include "stellate/connection.h"
 #include "stellate/error.h"
 #include "stellate/report.h"
 
@@ -41,18 +42,18 @@ struct MeshStatus {
 class Monitor {
  public:
   // kRefused: credentials that cannot be used. Whether the server exists shows in the first call.
-  static Expected<Monitor> Connect(const std::string& server, const Credentials& credentials = {});
+  static Expected<Monitor> Connect(const Connection& connection);
   Monitor(Monitor&&) noexcept;
   ~Monitor();
 
-  // kServerFailed when none answers within `timeout_seconds`.
-  Expected<ServerHealth> Health(double timeout_seconds = 5);
+  // kServerFailed when none answers within `timeout`.
+  Expected<ServerHealth> Health(Seconds timeout = Seconds(5));
   // All meshes that these credentials show, oldest first.
-  Expected<std::vector<MeshStatus>> Meshes(double timeout_seconds = 5);
+  Expected<std::vector<MeshStatus>> Meshes(Seconds timeout = Seconds(5));
   // Ends a mesh; what is meshed stays readable, unless it is deleted. kRefused: there is none, or
   // it is another's and the token no administrator's.
-  Expected<void> Cancel(const std::string& name, double timeout_seconds = 5);
-  Expected<void> Delete(const std::string& name, double timeout_seconds = 5);
+  Expected<void> Cancel(const std::string& name, Seconds timeout = Seconds(5));
+  Expected<void> Delete(const std::string& name, Seconds timeout = Seconds(5));
 
  private:
   class Impl;

@@ -7,27 +7,23 @@
 #include <string>
 
 #include "stellate/client.h"
+#include "stellate/connection.h"
 #include "stellate/error.h"
 #include "stellate/monitor.h"
 #include "stellate/oracle.h"
 
 namespace stellate {
 
-// Declares a mesh of the oracle's manifold on options.server, which is required, and returns its
-// name. Workers call ServeMesh with that name, here or elsewhere. No worker serves it yet; a server
-// deletes a mesh that has no worker for too long. Errors as of MeshManifold.
+// Declares a mesh of the oracle's manifold on options.connection.server, which is required, and
+// returns its name. Workers call ServeMesh with that name, here or elsewhere. No worker serves it
+// yet; a server deletes a mesh that has no worker for too long. Errors as of MeshManifold.
 Expected<std::string> DeclareMesh(Oracle& oracle, const MeshOptions& options);
 
 struct ServeOptions {
-  std::string server;  // "host:port" or "unix:/path"; must be given
-  Credentials credentials;
-  std::string worker;  // its name, for logs; at most 128 bytes
+  Connection connection;  // its server must be given
+  std::string worker;     // its name, for logs; at most 128 bytes
   // The most points in one call of the oracle; absent: as in MeshOptions.
   std::optional<std::uint32_t> max_chunk;
-  // As in MeshOptions, as is keepalive_seconds.
-  double reconnect_seconds = 180;
-  std::function<void(const Outage&)> on_outage;
-  double keepalive_seconds = 4;
   std::stop_token stop;  // this worker leaves: its unanswered queries go to others
 };
 
@@ -36,9 +32,8 @@ struct ServeOptions {
 //
 // Returns the state that the mesh ended in; immediately for a mesh that was over before this worker
 // came, so a late batch job is a success. kRefused: the oracle differs in kind from the one that
-// the mesh was declared with, or there is no such mesh (any more). Reason "CANCELLED": `stop` was
-// requested. An exception from the oracle reaches the caller unchanged, and the server as a failed
-// oracle.
+// the mesh was declared with, or there is no such mesh (any more). kStopped: `stop` was requested.
+// An exception from the oracle reaches the caller unchanged, and the server as a failed oracle.
 Expected<MeshState> ServeMesh(Oracle& oracle, const std::string& mesh_name,
                               const ServeOptions& options);
 

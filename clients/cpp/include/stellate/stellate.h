@@ -5,6 +5,7 @@
 #include "stellate/catalogue.h"
 #include "stellate/client.h"
 #include "stellate/command_oracle.h"
+#include "stellate/connection.h"
 #include "stellate/doctor.h"
 #include "stellate/download.h"
 #include "stellate/implicit.h"
@@ -15,3 +16,4 @@
 #include "stellate/oracles/walls.h"
 #include "stellate/pointwise.h"
 #include "stellate/serve.h"
+#include "stellate/version.h"

@@ -26,10 +26,9 @@ struct Domain {
 };
 
 std::shared_ptr<Oracle> Known(const std::string& spec) {
-  std::string why;
-  std::shared_ptr<Oracle> manifold = MakeManifold(spec, &why);
-  if (manifold == nullptr) Refuse(why);
-  return manifold;
+  Expected<std::unique_ptr<Manifold>> manifold = MakeManifold(spec);
+  if (!manifold) Refuse(manifold.error().message);
+  return std::move(*manifold);
 }
 
 // A dimension among the parameters.
@@ -187,21 +186,20 @@ Numbers Parameters(const std::string& spec, size_t colon, Numbers defaults) {
 
 }  // namespace
 
-std::unique_ptr<Oracle> MakeDomain(const std::string& spec, std::string* error) {
+Expected<std::unique_ptr<Oracle>> MakeDomain(const std::string& spec) {
   const size_t colon = spec.find(':');
   const std::string name = spec.substr(0, colon);
-  error->clear();
   for (const Domain& domain : Domains()) {
     const std::string& syntax = domain.entry.syntax;
     if (syntax.substr(0, syntax.find('[')) != name) continue;
     try {
       return domain.make(Parameters(spec, colon, domain.defaults));
     } catch (const std::invalid_argument& failure) {
-      *error = "manifold '" + spec + "': " + failure.what();
-      return nullptr;
+      return Fail(ErrorCode::kRefused, "manifold '" + spec + "': " + failure.what());
     }
   }
-  return nullptr;
+  return Fail(ErrorCode::kRefused, "manifold '" + spec + "': there is none of that name",
+              "UNKNOWN_NAME");
 }
 
 const std::vector<CatalogueEntry>& ListDomains() {

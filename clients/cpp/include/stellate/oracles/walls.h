@@ -139,9 +139,9 @@ class ManifoldWithBoundary final : public Oracle {
   double scale_ = 1, tolerance_;  // lengths: of where M is, and what is on its boundary
 };
 
-// Makes "name:parameter:...", a manifold with boundary that ListDomains names. On failure returns
-// null and says why in `error`, which is empty if there is none of that name.
-std::unique_ptr<Oracle> MakeDomain(const std::string& spec, std::string* error);
+// Makes "name:parameter:...", a manifold with boundary that ListDomains names. kRefused, with
+// reason "UNKNOWN_NAME" if there is none of that name.
+Expected<std::unique_ptr<Oracle>> MakeDomain(const std::string& spec);
 const std::vector<CatalogueEntry>& ListDomains();
 
 }  // namespace stellate::oracles
