@@ -40,7 +40,7 @@ void PrintTo(const Broken& broken, std::ostream* out) { *out << broken.code; }
 class BrokenOracle : public ::testing::TestWithParam<Broken> {};
 
 TEST_P(BrokenOracle, IsFoundOut) {
-  const auto torus = MakeManifold("torus:1:0.4", nullptr);
+  const auto torus = MakeManifold("torus:1:0.4").value();
   SpoiledOracle oracle(*torus);
   GetParam().spoil(oracle);
   const ExaminationReport report = Examine(oracle);
@@ -185,7 +185,7 @@ INSTANTIATE_TEST_SUITE_P(
 class GoodOracle : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(GoodOracle, Passes) {
-  const auto manifold = MakeManifold(GetParam(), nullptr);
+  const auto manifold = MakeManifold(GetParam()).value();
   ASSERT_NE(manifold, nullptr);
   const ExaminationReport report = Examine(*manifold, 0.1);
   for (const Finding& finding : report.findings) {
@@ -210,7 +210,7 @@ std::vector<std::string> Examples() {
 INSTANTIATE_TEST_SUITE_P(Catalogue, GoodOracle, ::testing::ValuesIn(Examples()));
 
 TEST(Examiner, ComparesEpsilonWithTheReach) {
-  const auto torus = MakeManifold("torus:1:0.4", nullptr);
+  const auto torus = MakeManifold("torus:1:0.4").value();
   const ExaminationReport coarse = Examine(*torus, 0.3);
   EXPECT_TRUE(coarse.ok());
   EXPECT_NE(Find(coarse, "COARSE_EPSILON"), nullptr);
@@ -221,7 +221,7 @@ TEST(Examiner, ComparesEpsilonWithTheReach) {
 TEST(ChooseEpsilon, IsAQuarterOfTheReachWhateverTheUnit) {
   for (const auto& [spec, expected] :
        {std::pair("torus:1:0.4", 0.1), std::pair("torus:1000:400", 100.0)}) {
-    const auto manifold = MakeManifold(spec, nullptr);
+    const auto manifold = MakeManifold(spec).value();
     const ChosenEpsilon chosen = ChooseEpsilon(Examine(*manifold));
     EXPECT_EQ(chosen.failure, "");
     EXPECT_NEAR(chosen.epsilon, expected, 0.05 * expected);
@@ -230,7 +230,7 @@ TEST(ChooseEpsilon, IsAQuarterOfTheReachWhateverTheUnit) {
 }
 
 TEST(ChooseEpsilon, RefusesAnOracleThatBreaksItsContract) {
-  const auto torus = MakeManifold("torus:1:0.4", nullptr);
+  const auto torus = MakeManifold("torus:1:0.4").value();
   SpoiledOracle oracle(*torus);
   oracle.on_closest = [](const Eigen::MatrixXd& x, Answer& a) { a.points = (a.points + x) / 2; };
   const ChosenEpsilon chosen = ChooseEpsilon(Examine(oracle));
@@ -241,7 +241,7 @@ TEST(ChooseEpsilon, RefusesAnOracleThatBreaksItsContract) {
 }
 
 TEST(Examiner, ReadsWell) {
-  const auto torus = MakeManifold("torus:1:0.4", nullptr);
+  const auto torus = MakeManifold("torus:1:0.4").value();
   SpoiledOracle oracle(*torus);
   oracle.on_tangents = [](Eigen::MatrixXd& bases) { bases *= 1.01; };
   const std::string text = ToText(Examine(oracle));
@@ -257,7 +257,7 @@ TEST(Examiner, ReadsWell) {
 }
 
 TEST(Examiner, NamesPlaceAndNumbers) {
-  const auto torus = MakeManifold("torus:1:0.4", nullptr);
+  const auto torus = MakeManifold("torus:1:0.4").value();
   SpoiledOracle oracle(*torus);
   oracle.on_tangents = [](Eigen::MatrixXd& bases) { bases *= 1.01; };
   const ExaminationReport report = Examine(oracle);
@@ -274,7 +274,7 @@ TEST(Examiner, NamesPlaceAndNumbers) {
 
 // All queries, and what was found but for speed.
 std::string Story(std::uint64_t seed) {
-  const auto so3 = MakeManifold("so3", nullptr);
+  const auto so3 = MakeManifold("so3").value();
   core::Specification spec = testing::ExaminationOf(*so3);
   spec.random_seed = seed;
   const auto examiner = core::Examiner::Create(spec, 0.3);
@@ -295,7 +295,7 @@ TEST(Examiner, AsksTheSameOfTheSame) {
 }
 
 TEST(Examiner, MeasuresSpeedByTheSecondsThatItIsGiven) {
-  const auto torus = MakeManifold("torus:1:0.4", nullptr);
+  const auto torus = MakeManifold("torus:1:0.4").value();
   const auto examiner = core::Examiner::Create(testing::ExaminationOf(*torus), std::nullopt);
   while (const auto batch = examiner->NextBatch()) {
     const double seconds = 0.01 + 0.001 * static_cast<double>(batch->size());
@@ -312,7 +312,7 @@ TEST(Examiner, MeasuresSpeedByTheSecondsThatItIsGiven) {
 }
 
 TEST(Examiner, RefusesAnswersOfAnotherShapeAndKeepsTheBatch) {
-  const auto torus = MakeManifold("torus:1:0.4", nullptr);
+  const auto torus = MakeManifold("torus:1:0.4").value();
   const auto examiner = core::Examiner::Create(testing::ExaminationOf(*torus), std::nullopt);
   const auto batch = examiner->NextBatch();
   core::Answers answers = testing::AnswersOf(*torus, *batch);
@@ -327,7 +327,7 @@ TEST(Examiner, RefusesAnswersOfAnotherShapeAndKeepsTheBatch) {
 
 TEST(Examiner, EndsWithTheFaultOfAnOracle) {
   using Kind = core::OracleFault::Kind;
-  const auto torus = MakeManifold("torus:1:0.4", nullptr);
+  const auto torus = MakeManifold("torus:1:0.4").value();
   for (const auto& [kind, code] :
        {std::pair(Kind::kRaised, "RAISED"), std::pair(Kind::kShape, "WRONG_SHAPE"),
         std::pair(Kind::kNotFinite, "NOT_FINITE"), std::pair(Kind::kInexact, "INEXACT"),
@@ -349,7 +349,7 @@ class Hostile : public ::testing::TestWithParam<int> {};
 TEST_P(Hostile, AnswersAreSurvived) {
   std::mt19937_64 random(static_cast<std::uint64_t>(GetParam()));
   const auto good =
-      GetParam() % 2 == 0 ? MakeManifold("torus:1:0.4", nullptr) : MakeManifold("so3", nullptr);
+      GetParam() % 2 == 0 ? MakeManifold("torus:1:0.4", nullptr) : MakeManifold("so3").value();
   const double odd[] = {
       0, 1, -1, 1e-300, 1e300, -1e45, 1e44, kNaN, std::numeric_limits<double>::infinity()};
   const auto examiner = core::Examiner::Create(testing::ExaminationOf(*good), 1e-3);

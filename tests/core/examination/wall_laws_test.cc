@@ -24,7 +24,7 @@ using oracles::Ball, oracles::Box, oracles::Clipped, oracles::HalfSpace, oracles
     oracles::Wall;
 using testing::Examine, testing::Find;
 
-std::shared_ptr<Oracle> Known(const std::string& spec) { return MakeManifold(spec, nullptr); }
+std::shared_ptr<Oracle> Known(const std::string& spec) { return MakeManifold(spec).value(); }
 VectorXd Up() { return VectorXd::Unit(3, 2); }
 
 // A sphere cut at z = -0.1, whose answers can be changed.
