@@ -158,9 +158,7 @@ INSTANTIATE_TEST_SUITE_P(
 class GoodWalls : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(GoodWalls, Pass) {
-  std::string why;
-  const auto domain = oracles::MakeDomain(GetParam(), &why);
-  ASSERT_NE(domain, nullptr) << why;
+  const auto domain = oracles::MakeDomain(GetParam()).value();
   const ExaminationReport report = Examine(*domain);
   const std::set<std::string> harmless = {"REACH", "PIECES", "SPEED", "SLOW", "NOT_CLOSEST_FAR"};
   for (const Finding& finding : report.findings) {
@@ -173,8 +171,7 @@ INSTANTIATE_TEST_SUITE_P(Catalogue, GoodWalls,
                                            "cube:2", "cylinder", "shell", "solid-torus"));
 
 TEST(Walls, TheReachOfABoundaryCounts) {
-  std::string why;
-  const auto ball = oracles::MakeDomain("ball", &why);
+  const auto ball = oracles::MakeDomain("ball").value();
   EXPECT_NEAR(*Examine(*ball).reach, 1, 1e-6);
   Cut cut;
   EXPECT_NEAR(*Examine(cut).reach, std::sqrt(0.99), 1e-6);
