@@ -35,7 +35,7 @@ struct ReconstructionCounts {
   std::uint64_t tiles = 0;     // simplices of tilings
   std::uint64_t unfilled_vertices = 0;  // vertices of cavities that were left
   // The share of points around which the points look this many-dimensional, by k = 0 to 4; 0 is
-  // "more than 4".
+  // "more than 4". All 0 where tangent spaces were given.
   double looks[5] = {};
 };
 

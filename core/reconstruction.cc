@@ -4,10 +4,12 @@
 #include <cmath>
 #include <string>
 
+#include "core/base/arenas.h"
 #include "core/base/basis_layout.h"
 #include "core/base/message.h"
 #include "core/base/vector_ops.h"
 #include "core/batch.h"
+#include "core/reconstruction/reconstructor.h"
 #include "core/specification.h"
 
 namespace stellate::core {
@@ -145,10 +147,16 @@ void ReconstructionWatch::Advance(ReconstructionPhase phase, double fraction) {
 }
 
 Expected<Reconstruction> Reconstruct(const ReconstructionSpecification& spec,
-                                     const PointCloud& cloud, ReconstructionWatch* /*watch*/) {
+                                     const PointCloud& cloud, ReconstructionWatch* watch) {
   if (Status status = Validate(spec); !status.ok()) return tl::unexpected(status);
   if (Status status = Validate(spec, cloud); !status.ok()) return tl::unexpected(status);
-  return Refuse(StatusCode::kFailedPrecondition, "this build does not reconstruct yet");
+  ReconstructionWatch own;
+  if (!watch) watch = &own;
+  Expected<Reconstruction> result;
+  const bool finished = WithThreads(spec.threads, watch->interruption(),
+                                    [&] { result = ReconstructCloud(spec, cloud, watch); });
+  if (!finished) return Refuse(StatusCode::kCancelled, "the reconstruction was cancelled");
+  return result;
 }
 
 }  // namespace stellate::core

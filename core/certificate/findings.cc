@@ -30,6 +30,15 @@ void Findings::Refuse(Subject subject, std::string problem) {
   problems_.insert(place, {subject, std::move(problem)});
 }
 
+std::string Findings::Problems() const {
+  if (clean()) return {};
+  std::string text = Message(problems_.front().text, ".");
+  if (problems_.size() > 1)
+    text += Message(" Other checks failed too (", problems_.size() - 1,
+                    "), next: ", problems_[1].text, ".");
+  return text;
+}
+
 bool Findings::IsOnlyTooCoarse(double epsilon_over_reach) const {
   return problems_.size() == 1 && problems_.front().subject == kReach &&
          epsilon_over_reach <= kNearlyFine;
@@ -97,6 +106,16 @@ std::string DescribeRegions(const Certificate& certificate) {
   return Message(", in ", counted(certificate.regions.size(), "region"), " (", regions, ")");
 }
 
+std::string DescribeManifold(int k, bool has_boundary, const Certificate& certificate) {
+  const std::uint64_t components = certificate.components;
+  return Message(has_boundary ? "a compact " : "a closed ",
+                 certificate.orientable ? "orientable" : "non-orientable",
+                 " manifold of dimension ", k, " with ", components,
+                 components == 1 ? " component" : " components", " and Euler characteristic ",
+                 certificate.euler_characteristic, DescribeRegions(certificate),
+                 has_boundary ? DescribeBoundary(certificate) : "");
+}
+
 void Findings::Conclude(int k, const Specification& spec, Certificate& certificate) const {
   certificate.certified = clean();
   certificate.level = !clean()           ? CertificateLevel::kRefused
@@ -104,11 +123,7 @@ void Findings::Conclude(int k, const Specification& spec, Certificate& certifica
                                          : CertificateLevel::kProved;
   certificate.warnings = warnings_;
   if (!clean()) {
-    certificate.verdict = Message("Not certified: ", problems_.front().text, ".");
-    if (problems_.size() > 1) {
-      certificate.verdict += Message(" Other checks failed too (", problems_.size() - 1,
-                                     "), next: ", problems_[1].text, ".");
-    }
+    certificate.verdict = Message("Not certified: ", Problems());
     certificate.only_too_coarse = IsOnlyTooCoarse(certificate.epsilon_over_reach);
     if (certificate.only_too_coarse)
       certificate.verdict +=
@@ -119,12 +134,7 @@ void Findings::Conclude(int k, const Specification& spec, Certificate& certifica
   }
   const std::uint64_t components = certificate.components;
   const bool has_walls = spec.walls > 0;
-  const std::string what =
-      Message(has_walls ? "a compact " : "a closed ",
-              certificate.orientable ? "orientable" : "non-orientable", " manifold of dimension ",
-              k, " with ", components, components == 1 ? " component" : " components",
-              " and Euler characteristic ", certificate.euler_characteristic,
-              DescribeRegions(certificate), has_walls ? DescribeBoundary(certificate) : "");
+  const std::string what = DescribeManifold(k, has_walls, certificate);
   const char* const unseen =
       "Components of the manifold that no seed or sampled point fell on cannot be excluded";
   const char* const declared = components == static_cast<std::uint64_t>(spec.components)

@@ -33,6 +33,10 @@ std::string TooCoarse(double ratio, double reach, const std::string& where);
 // are active. `met`: the walls that have vertices.
 std::string AboutInactiveWall(int walls, WallSet met);
 
+// Returns what a certificate says that the mesh is: "a closed orientable manifold of dimension 2
+// with 1 component and Euler characteristic 0".
+std::string DescribeManifold(int k, bool has_boundary, const Certificate& certificate);
+
 // Collects what speaks against a mesh, in plain words: problems refuse it, warnings do not.
 //
 //   findings.Refuse(Findings::kLinks, "the link of vertex 3 is not a sphere");
@@ -72,6 +76,10 @@ class Findings {
   }
 
   bool clean() const { return problems_.empty(); }
+  // Returns the first problem, and the next if there are more, as sentences; empty if clean.
+  std::string Problems() const;
+  const std::string& theorem() const { return theorem_; }  // empty: none
+  const std::vector<std::string>& warnings() const { return warnings_; }
   // Whether an undeclared boundary may be the cause of one of the problems.
   bool MayBeBoundary() const;
   // Whether the mesh is refused for its size alone, and is not so coarse that little else could be

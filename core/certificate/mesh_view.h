@@ -20,6 +20,9 @@ struct MeshView {
   const double* tangents = nullptr;  // vertices x k x d, C order, orthonormal rows
   const std::vector<std::uint32_t>* simplices = nullptr;  // k+1 ascending vertex ids each
 
+  // By vertex, 1: it is left out on purpose, and is in no simplex; null: none is.
+  const std::uint8_t* unused = nullptr;
+
   // For manifolds with boundary, else null: the walls of each vertex; the sum of their conormals, k
   // tangent coordinates for each vertex; and the faces.
   const WallSet* walls = nullptr;
@@ -34,6 +37,7 @@ struct MeshView {
   // The squared radii of protecting balls, by vertex (Sample::SetProtectingBalls); null: none.
   const double* protecting_radii2 = nullptr;
 
+  bool IsUnused(std::uint32_t v) const { return unused && unused[v] != 0; }
   WallSet WallsOf(std::uint32_t v) const { return walls ? walls[v] : 0; }
   double ProtectingRadius2(std::uint32_t v) const {
     return protecting_radii2 ? protecting_radii2[v] : 0;

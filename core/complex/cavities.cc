@@ -367,14 +367,14 @@ FilledCavities FillCavities(const Stars<K>& stars, const FillingRules& rules) {
       ++result.filled;
       result.filling += cavity.filling().size();
       all.insert(all.end(), cavity.filling().begin(), cavity.filling().end());
-      continue;
     }
-    const auto& at = cavity.vertices();
-    result.unfilled.insert(result.unfilled.end(), at.begin(), at.end());
+    auto& ids = filled[i] ? result.tiled : result.unfilled;
+    ids.insert(ids.end(), cavity.vertices().begin(), cavity.vertices().end());
   }
-  std::sort(result.unfilled.begin(), result.unfilled.end());
-  result.unfilled.erase(std::unique(result.unfilled.begin(), result.unfilled.end()),
-                        result.unfilled.end());
+  for (auto* ids : {&result.tiled, &result.unfilled}) {
+    std::sort(ids->begin(), ids->end());
+    ids->erase(std::unique(ids->begin(), ids->end()), ids->end());
+  }
   ParallelSort(all, std::less<>());
   result.simplices.reserve(all.size() * (K + 1));
   for (const auto& s : all) result.simplices.insert(result.simplices.end(), s.begin(), s.end());

@@ -34,6 +34,7 @@ struct FilledCavities {
   std::uint64_t filling = 0;             // simplices of all fillings
   std::vector<std::uint32_t> simplices;  // consistent and filling ones, K+1 ids each, sorted
   std::vector<std::uint32_t> unfilled;   // vertices of the cavities that are not filled, ascending
+  std::vector<std::uint32_t> tiled;      // of those that are
 };
 
 // Fills the cavities that it can. A simplex is consistent here if the stars of all its vertices

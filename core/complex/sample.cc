@@ -102,17 +102,7 @@ void Sample<K>::Lift(std::uint32_t p, const double* x, double* point) const {
 template <int K>
 int Sample<K>::Nearest(const double* q, int count,
                        std::pair<double, std::uint32_t>* nearest) const {
-  int found = 0;
-  tree().VisitNear(
-      q, [&] { return found < count ? INFINITY : std::sqrt(nearest[count - 1].first); },
-      [&](std::uint32_t id, double distance2) {
-        const std::pair<double, std::uint32_t> candidate{distance2, id};
-        if (found == count && !(candidate < nearest[count - 1])) return;
-        int at = found < count ? found++ : count - 1;
-        for (; at > 0 && candidate < nearest[at - 1]; --at) nearest[at] = nearest[at - 1];
-        nearest[at] = candidate;
-      });
-  return found;
+  return FindNearest(tree(), q, count, nearest);
 }
 
 STELLATE_INSTANTIATE_CLASS(Sample)

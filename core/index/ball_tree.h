@@ -278,6 +278,23 @@ class BallTree {
   std::size_t built_nodes_ = 0;         // nodes then, numbered along the tree
 };
 
+// Writes the `count` points nearest to q as (squared distance, id), nearest first and ties by id,
+// and returns how many there are.
+inline int FindNearest(const BallTree& tree, const double* q, int count,
+                       std::pair<double, std::uint32_t>* nearest) {
+  int found = 0;
+  tree.VisitNear(
+      q, [&] { return found < count ? INFINITY : std::sqrt(nearest[count - 1].first); },
+      [&](std::uint32_t id, double distance2) {
+        const std::pair<double, std::uint32_t> candidate{distance2, id};
+        if (found == count && !(candidate < nearest[count - 1])) return;
+        int at = found < count ? found++ : count - 1;
+        for (; at > 0 && candidate < nearest[at - 1]; --at) nearest[at] = nearest[at - 1];
+        nearest[at] = candidate;
+      });
+  return found;
+}
+
 // Returns the squared distance from q to the nearest point; infinity if there is none.
 inline double NearestSquaredDistance(const BallTree& tree, const double* q) {
   double best = INFINITY;

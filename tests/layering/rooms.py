@@ -62,7 +62,16 @@ CORE = {
         "core/speculation",
     ),
     "core/examination": ("core", "core/base"),  # whether an oracle keeps its contract
+    "core/reconstruction": (
+        *_GROUND,
+        "core/complex",
+        "core/certificate",
+        "core/certificate/complex",
+        "core/certificate/claims",
+        "core/certificate/measure",
+    ),
     # The doors from the face.
+    "core/reconstruction.cc": ("core", "core/base", "core/reconstruction"),
     "core/mesher.cc": ("core", "core/base", "core/run"),
     "core/examiner.cc": ("core", "core/base", "core/examination"),
 }
@@ -226,7 +235,8 @@ EVERY_PYTHON = tuple(room for room in CLIENTS if room.startswith("clients/python
 EVERY_SERVER = tuple(SERVER)
 TESTS = {
     "tests/support": (*FACE, "clients/cpp/include"),
-    "tests/core": (*EVERY_CORE, "tests/support", "clients/cpp/include"),
+    "tests/core": (*EVERY_CORE, "tests/support", "tests/reconstruction", "clients/cpp/include"),
+    "tests/reconstruction": (*FACE, "core/index"),
     "tests/server": (*FACE, "proto", *EVERY_SERVER, "tests/support"),
     "tests/clients": ("proto", *EVERY_CPP, *EVERY_PYTHON, "clients/cli", "tests/support"),
     "tests/e2e": ("proto", *EVERY_CPP, *EVERY_PYTHON, "tests/support"),
@@ -287,6 +297,7 @@ TABLE = Table(
             "core/certificate/measure/shape.cc",
             "core/examination/probe.cc",
             "core/geometry/reach.cc",
+            "core/reconstruction/judgement.cc",
             "core/geometry/simplex.cc",
             "core/boundary/sharp_edges.cc",
             "core/boundary/wall_bends.cc",

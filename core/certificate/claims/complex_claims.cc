@@ -122,6 +122,20 @@ Topology ExamineTopology(const Adjacency& adjacency, const ClosedOff* closed_off
   return topology;
 }
 
+// Takes the vertices that are left out on purpose from the isolated ones. Those named are the first
+// of all, so that they are looked for again.
+void ForgetUnused(const Examination& x, Connectivity* connectivity) {
+  if (!x.mesh.unused || connectivity->isolated_vertices == 0) return;
+  connectivity->isolated_vertices = 0;
+  connectivity->some_isolated.clear();
+  for (std::uint32_t v = 0; v < x.mesh.vertices; ++v) {
+    CheckInterruption(v);
+    if (x.mesh.IsUnused(v) || !x.stars->Star(v).empty()) continue;
+    if (connectivity->isolated_vertices++ < Violations::kMost)
+      connectivity->some_isolated.push_back(v);
+  }
+}
+
 // Measures the stars. Unless all of them embed, also examines the topology by adjacency, to find
 // what is wrong.
 StarGeometry MeasureComplex(Examination& x, const ClosedOff* closed, Topology* topology) {
@@ -134,6 +148,7 @@ StarGeometry MeasureComplex(Examination& x, const ClosedOff* closed, Topology* t
   *topology = ExamineTopology(adjacency, closed);
   StarGeometry stars = MeasureStars(x.mesh, adjacency, topology->connectivity.orientation);
   *x.stars = std::move(adjacency);
+  ForgetUnused(x, &topology->connectivity);
   return stars;
 }
 

@@ -13,8 +13,13 @@
 namespace stellate::core {
 namespace {
 
+// Of a whole mesh, as PartOfStars has them.
+struct Numbers {
+  std::uint64_t neighbours = 0, unused = 0;
+};
+
 template <int K>
-StarGeometry RunSweep(Sweep& sweep, std::uint64_t* neighbours) {
+StarGeometry RunSweep(Sweep& sweep, Numbers* numbers) {
   const MeshView& mesh = sweep.mesh;
   std::vector<PartOfStars> parts(ChunkCount(mesh.vertices));
   ParallelChunks(mesh.vertices, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
@@ -36,16 +41,17 @@ StarGeometry RunSweep(Sweep& sweep, std::uint64_t* neighbours) {
     whole.unembedded_stars += stars.unembedded_stars;
     AppendFirst(stars.some_unembedded, Violations::kMost, &whole.some_unembedded);
     shapes.push_back(std::move(part.shape));
-    *neighbours += part.neighbours;
+    numbers->neighbours += part.neighbours;
+    numbers->unused += part.unused;
   }
   whole.longest_edge = std::move(sweep.longest_edge);
   whole.shape = sweep.shape.Conclude(shapes);
   return whole;
 }
 
-StarGeometry MeasureBy(Sweep& sweep, std::uint64_t* neighbours) {
+StarGeometry MeasureBy(Sweep& sweep, Numbers* numbers) {
   sweep.longest_edge.assign(sweep.mesh.vertices, 0);
-  return WithMeshDimension(sweep.mesh.k, [&](auto k) { return RunSweep<k()>(sweep, neighbours); });
+  return WithMeshDimension(sweep.mesh.k, [&](auto k) { return RunSweep<k()>(sweep, numbers); });
 }
 
 }  // namespace
@@ -54,8 +60,8 @@ StarGeometry MeasureStars(const MeshView& mesh, const Adjacency& adjacency,
                           std::span<const std::int8_t> orientation) {
   if (adjacency.bad_facets() > 0) orientation = {};
   Sweep sweep{mesh, adjacency, &adjacency, orientation, {mesh, adjacency.list()}, {}, {}};
-  std::uint64_t neighbours = 0;
-  return MeasureBy(sweep, &neighbours);
+  Numbers numbers;
+  return MeasureBy(sweep, &numbers);
 }
 
 std::optional<EmbeddedStars> MeasureIfEmbedded(const MeshView& mesh, const VertexStars& stars) {
@@ -64,15 +70,16 @@ std::optional<EmbeddedStars> MeasureIfEmbedded(const MeshView& mesh, const Verte
   Sweep sweep{mesh, stars, nullptr, {}, {mesh, stars.list()}, {}, {}};
   sweep.sides.assign(simplices, 0);
   EmbeddedStars embedded;
-  std::uint64_t neighbours = 0;
-  embedded.geometry = MeasureBy(sweep, &neighbours);
+  Numbers numbers;
+  embedded.geometry = MeasureBy(sweep, &numbers);
   if (sweep.is_refuted) return std::nullopt;
   embedded.connectivity = ComputeConnectivity(stars.list(), sweep.sides);
   // V - E + F - ..., with k + 1 facets a simplex, each in two: V - E for a curve, V - E + F for
   // both a surface and a manifold of dimension 3.
-  embedded.euler_characteristic = static_cast<std::int64_t>(mesh.vertices) -
-                                  static_cast<std::int64_t>(neighbours / 2) +
+  embedded.euler_characteristic = static_cast<std::int64_t>(mesh.vertices - numbers.unused) -
+                                  static_cast<std::int64_t>(numbers.neighbours / 2) +
                                   (mesh.k > 1 ? std::int64_t{simplices} : 0);
+  embedded.connectivity.components -= numbers.unused;
   return embedded;
 }
 

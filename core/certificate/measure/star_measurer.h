@@ -52,6 +52,7 @@ struct PartOfStars {
   StarGeometry stars;
   ShapeSearch::Part shape;
   std::uint64_t neighbours = 0;  // of the vertices, in all
+  std::uint64_t unused = 0;      // vertices
 };
 
 // Measures the stars of the vertices from `begin` to `end`, one thread's part of the pass.
@@ -73,7 +74,10 @@ class StarMeasurer {
       const int d = known() > 0 ? known() : mesh_.d;
       for (auto p = static_cast<std::uint32_t>(begin); p < end; ++p) {
         if (stars_.Star(p).empty()) {
-          if (!sweep_.adjacency) sweep_.is_refuted = true;
+          if (mesh_.IsUnused(p))
+            ++part_.unused;
+          else if (!sweep_.adjacency)
+            sweep_.is_refuted = true;
           continue;
         }
         Project(p, d);

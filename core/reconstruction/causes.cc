@@ -1,0 +1,136 @@
+#include "core/reconstruction/causes.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+
+#include "core/base/dense.h"
+#include "core/base/parallel.h"
+#include "core/base/vector_ops.h"
+
+namespace stellate::core {
+namespace {
+
+// In local spacings.
+constexpr double kNoisy = 0.5;      // the standard deviation of a coordinate
+constexpr double kClose = 0.1;      // to the nearest point
+constexpr double kOutlier = 1;      // over the fitted quadric
+constexpr double kSheetFrom = 0.3;  // where another sheet is looked for
+constexpr double kSheetTo = 2;
+// And in standard deviations: what noise alone makes is no outlier.
+constexpr double kOutlierDeviations = 4;
+// A point this steeply above a tangent space, as a share of its distance, is on another sheet where
+// the tangent spaces are nearly parallel: sin^2 of 30 degrees.
+constexpr double kSteep = 0.5;
+// And farther above it, in standard deviations, than noise often moves a point.
+constexpr double kSheetDeviations = 2.5;
+constexpr double kParallel2 = 0.25;
+// sin^2 of 60 degrees.
+constexpr double kTurned2 = 0.75;
+// Residuals on two sheets, midway between normal ones, 3, cut short by the fit, and two values, 1.
+constexpr double kTwoSheets = 1.5;
+
+// The cosines between the tangent vectors at two points.
+Eigen::MatrixXd CosinesBetween(const FittedCloud& cloud, std::uint32_t p, std::uint32_t q) {
+  Eigen::MatrixXd cosines(cloud.k, cloud.k);
+  for (int a = 0; a < cloud.k; ++a)
+    for (int b = 0; b < cloud.k; ++b)
+      cosines(a, b) = Dot(cloud.Tangent(p) + a * cloud.d, cloud.Tangent(q) + b * cloud.d, cloud.d);
+  return cosines;
+}
+
+// Whether the largest angle between two tangent spaces has a squared sine above a bound. The sum of
+// all squared sines, which is soon computed, decides most often.
+bool TurnsBy(double sine2, const FittedCloud& cloud, std::uint32_t p, std::uint32_t q) {
+  double sum = cloud.k;
+  for (int a = 0; a < cloud.k; ++a)
+    for (int b = 0; b < cloud.k; ++b) {
+      const double cosine =
+          Dot(cloud.Tangent(p) + a * cloud.d, cloud.Tangent(q) + b * cloud.d, cloud.d);
+      sum -= cosine * cosine;
+    }
+  if (!(sum > sine2) || cloud.k == 1) return sum > sine2;
+  const Eigen::MatrixXd cosines = CosinesBetween(cloud, p, q);
+  return 1 - EigenvaluesOfSymmetric(cosines.transpose() * cosines)[0] > sine2;
+}
+
+bool HasSheetNear(const FittedCloud& cloud, std::uint32_t p) {
+  if (cloud.kurtosis[p] < kTwoSheets) return true;
+  const double h = cloud.spacing[p];
+  std::vector<double> step(static_cast<std::size_t>(cloud.d));
+  for (const std::uint32_t q : cloud.Near(p)) {
+    const double *a = cloud.Position(p), *b = cloud.Position(q);
+    for (int i = 0; i < cloud.d; ++i) step[static_cast<std::size_t>(i)] = b[i] - a[i];
+    const double distance2 = Dot(step.data(), step.data(), cloud.d);
+    if (distance2 < kSheetFrom * kSheetFrom * h * h || distance2 > kSheetTo * kSheetTo * h * h)
+      continue;
+    double along2 = 0;
+    for (int e = 0; e < cloud.k; ++e) {
+      const double along = Dot(cloud.Tangent(p) + e * cloud.d, step.data(), cloud.d);
+      along2 += along * along;
+    }
+    const double above2 = distance2 - along2;
+    const double noise = kSheetDeviations * cloud.noise[p];
+    if (above2 > kSteep * kSteep * distance2 && above2 > noise * noise &&
+        !TurnsBy(kParallel2, cloud, p, q))
+      return true;
+  }
+  return false;
+}
+
+bool IsNoisy(const FittedCloud& cloud, std::uint32_t p) {
+  const double h = cloud.spacing[p];
+  return cloud.noise[p] > kNoisy * h ||
+         cloud.height[p] > std::max(kOutlier * h, kOutlierDeviations * cloud.noise[p]);
+}
+
+// Marks the vertices of edges along which tangent spaces turn too far.
+std::vector<std::uint8_t> FindTurning(const FittedCloud& cloud, const Assembly& assembly) {
+  std::vector<std::uint8_t> turning(cloud.size);
+  const auto width = static_cast<std::size_t>(cloud.k) + 1;
+  const auto test = [&](std::uint32_t p, std::uint32_t q) {
+    if (!TurnsBy(kTurned2, cloud, p, q)) return;
+    for (const std::uint32_t v : {p, q})
+      std::atomic_ref(turning[v]).store(1, std::memory_order_relaxed);
+  };
+  ParallelFor(assembly.simplices.size() / width, [&](std::size_t s) {
+    const std::uint32_t* const ids = assembly.simplices.data() + s * width;
+    for (std::size_t i = 0; i < width; ++i)
+      for (std::size_t j = 0; j < i; ++j) test(ids[i], ids[j]);
+  });
+  // Unresolved places have fewer simplices, or none.
+  ParallelFor(cloud.size, [&](std::uint32_t p) {
+    if (assembly.places[p] != Place::kDisagree) return;
+    for (const std::uint32_t q : cloud.Near(p).first(
+             std::min<std::size_t>(cloud.near_count, static_cast<std::size_t>(2 * cloud.k) + 1)))
+      test(p, q);
+  });
+  return turning;
+}
+
+}  // namespace
+
+Causes FindCauses(const FittedCloud& cloud, const Assembly& assembly, bool edges_allowed) {
+  const std::vector<std::uint8_t> turning = FindTurning(cloud, assembly);
+  Causes causes;
+  causes.places.assign(cloud.size, Place::kOk);
+  ParallelFor(cloud.size, [&](std::uint32_t p) {
+    if (assembly.places[p] == Place::kDropped) return;
+    const bool resolved = assembly.places[p] != Place::kDisagree;
+    Place& cause = causes.places[p];
+    if (!(assembly.radii[p] <= OpenRadius(cloud, p)) && !(edges_allowed && resolved))
+      cause = Place::kEdge;
+    else if (HasSheetNear(cloud, p))
+      cause = Place::kSheets;
+    else if (IsNoisy(cloud, p))
+      cause = Place::kNoise;
+    else if (turning[p])
+      cause = Place::kSparse;
+    else if (!resolved)
+      cause = cloud.nearest[p] < kClose * cloud.spacing[p] ? Place::kClose : Place::kDisagree;
+  });
+  for (const Place cause : causes.places) causes.count += cause != Place::kOk;
+  return causes;
+}
+
+}  // namespace stellate::core
