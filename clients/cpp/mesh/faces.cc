@@ -4,6 +4,9 @@
 #include <cstdint>
 #include <map>
 #include <numeric>
+#include <set>
+#include <stdexcept>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -46,17 +49,26 @@ std::vector<Index> AllOf(const SimplexMatrix& simplices) {
   return all;
 }
 
-// The columns that are there once, in lexicographic order.
-SimplexMatrix ThoseOnce(const SimplexMatrix& simplices) {
-  const std::vector<Index> order = Sorted(simplices, AllOf(simplices));
-  std::vector<Index> once;
+// The facets in one simplex alone, or, with labels, in several of different ones; in lexicographic
+// order.
+SimplexMatrix Bounding(const SimplexMatrix& simplices, const std::vector<std::uint8_t>& labels) {
+  const SimplexMatrix facets = Subsets(simplices);
+  const auto differ = [&](Index a, Index b) {
+    return !labels.empty() && labels[static_cast<size_t>(a % simplices.cols())] !=
+                                  labels[static_cast<size_t>(b % simplices.cols())];
+  };
+  const std::vector<Index> order = Sorted(facets, AllOf(facets));
+  std::vector<Index> bounding;
   for (size_t i = 0; i < order.size();) {
+    bool bounds = true;
     size_t end = i + 1;
-    while (end < order.size() && AreEqual(simplices, order[i], order[end])) ++end;
-    if (end == i + 1) once.push_back(order[i]);
+    for (; end < order.size() && AreEqual(facets, order[i], order[end]); ++end) {
+      bounds = (bounds && end > i + 1) || differ(order[i], order[end]);
+    }
+    if (bounds) bounding.push_back(order[i]);
     i = end;
   }
-  return simplices(Eigen::all, once);
+  return facets(Eigen::all, bounding);
 }
 
 WallBits InCommon(const std::vector<WallBits>& walls, const SimplexMatrix& simplices, Index j) {
@@ -84,13 +96,15 @@ Walls ListOf(WallBits bits) {
   return walls;
 }
 
-}  // namespace
-
-std::vector<Face> Mesh::faces(int dimension) const {
-  if (walls.empty() || dimension < 0 || dimension >= this->dimension() || simplices.cols() == 0) {
+// The faces of a mesh, of a dimension below k; with labels, those between regions, too.
+std::vector<Face> FacesOf(const Mesh& mesh, int dimension,
+                          const std::vector<std::uint8_t>& labels) {
+  const std::vector<WallBits>& walls = mesh.walls;
+  if (walls.empty() || dimension < 0 || dimension >= mesh.dimension() ||
+      mesh.simplices.cols() == 0) {
     return {};
   }
-  SimplexMatrix rows = ThoseOnce(Subsets(simplices));
+  SimplexMatrix rows = Bounding(mesh.simplices, labels);
   while (rows.rows() - 1 > dimension && rows.cols() > 0) rows = Ridges(rows, walls);
   std::map<Walls, std::vector<Index>> of_walls;
   for (Index j = 0; j < rows.cols(); ++j) {
@@ -103,6 +117,28 @@ std::vector<Face> Mesh::faces(int dimension) const {
   for (const auto& [on, columns] : of_walls) faces.push_back({on, rows(Eigen::all, columns)});
   return faces;
 }
+
+}  // namespace
+
+Mesh Mesh::Region(int label) const {
+  std::vector<Index> columns;
+  for (size_t j = 0; j < labels.size(); ++j) {
+    if (labels[j] == label) columns.push_back(static_cast<Index>(j));
+  }
+  if (columns.empty()) {
+    std::string have;
+    for (const int known : std::set<int>(labels.begin(), labels.end())) {
+      have += (have.empty() ? "" : ", ") + std::to_string(known);
+    }
+    throw std::invalid_argument("the mesh has no region " + std::to_string(label) + "; it has [" +
+                                have + "]");
+  }
+  return {points, simplices(Eigen::all, columns), {}, walls};
+}
+
+std::vector<Face> Mesh::boundary() const { return FacesOf(*this, dimension() - 1, {}); }
+
+std::vector<Face> Mesh::faces(int dimension) const { return FacesOf(*this, dimension, labels); }
 
 std::vector<Face> Mesh::edges() const {
   std::vector<Face> edges = faces(1);

@@ -10,7 +10,8 @@ namespace {
 using Eigen::Index;
 using Ids = std::vector<std::uint32_t>;
 
-// The facets, ascending in each column, as the cells that have them induce their orientation.
+// The facets, ascending in each column, as the cells that have them induce their orientation: where
+// two have one, that in the region of the lower label, which comes first.
 SimplexMatrix Turned(const SimplexMatrix& facets, const SimplexMatrix& cells) {
   std::map<Ids, Index> wanted;
   for (Index j = 0; j < facets.cols(); ++j) {
@@ -34,6 +35,7 @@ SimplexMatrix Turned(const SimplexMatrix& facets, const SimplexMatrix& cells) {
       if (place == wanted.end()) continue;
       if (out % 2 == 1) std::iter_swap(facet.end() - 2, facet.end() - 1);
       std::copy(facet.begin(), facet.end(), turned.col(place->second).begin());
+      wanted.erase(place);
     }
   }
   return turned;
@@ -52,11 +54,25 @@ Group GroupOf(Face face, int tag) {
 }  // namespace
 
 std::vector<Group> GroupsOf(const Mesh& mesh) {
-  std::vector<Group> groups = {{1, "inside", 0, OrientedSimplices(mesh)}};
+  SimplexMatrix cells = OrientedSimplices(mesh);
+  std::vector<Group> groups;
+  std::map<std::uint8_t, std::vector<Index>> regions;
+  for (size_t j = 0; j < mesh.labels.size(); ++j) {
+    regions[mesh.labels[j]].push_back(static_cast<Index>(j));
+  }
+  if (regions.size() < 2) groups.push_back({1, "inside", 0, cells});
+  std::vector<Index> by_region;
+  for (const auto& [label, columns] : regions) {
+    by_region.insert(by_region.end(), columns.begin(), columns.end());
+    if (regions.size() < 2) continue;
+    groups.push_back({static_cast<int>(groups.size()) + 1, "region_" + std::to_string(label), 0,
+                      cells(Eigen::all, columns)});
+  }
+  if (!by_region.empty()) cells = SimplexMatrix(cells(Eigen::all, by_region));
   for (int dimension = mesh.dimension() - 1; dimension >= 0; --dimension) {
     for (Face& face : mesh.faces(dimension)) {
       if (dimension == mesh.dimension() - 1 && dimension >= 1) {
-        face.simplices = Turned(face.simplices, groups.front().simplices);
+        face.simplices = Turned(face.simplices, cells);
       }
       groups.push_back(GroupOf(std::move(face), static_cast<int>(groups.size()) + 1));
     }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cstdint>
 #include <functional>
+#include <vector>
 
 #include "stellate/oracle.h"
 #include "stellate/v1/stellate.grpc.pb.h"
@@ -36,6 +37,9 @@ class AskedOracle final : public Oracle {
   Eigen::VectorXd LocalSize(const Eigen::MatrixXd& points) override;
   // Servers take no more walls than these.
   int walls() const override { return static_cast<int>(std::min(64u, spec_.walls())); }
+  std::vector<std::uint8_t> labels() const override {
+    return {spec_.labels().begin(), spec_.labels().end()};
+  }
   Answer FacePoint(const Eigen::MatrixXd& x, const Walls& face) override;
   Eigen::MatrixXd Clearances(const Eigen::MatrixXd& points) override;
   Eigen::MatrixXd Conormals(const Eigen::MatrixXd& points, const Walls& face) override;

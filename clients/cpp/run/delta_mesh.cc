@@ -20,11 +20,12 @@ template <size_t N>
 class FixedSet final : public SimplexSet {
  public:
   std::size_t bytes() const override {
-    return nodes_.capacity() * sizeof(Node) + first_of_.capacity() * sizeof(first_of_[0]);
+    return nodes_.capacity() * sizeof(Node) + first_of_.capacity() * sizeof(first_of_[0]) +
+           labels_.capacity();
   }
 
   bool Add(const char* ids, Eigen::Index count, std::uint64_t vertices,
-           const char* turned) override {
+           const Marks& marks) override {
     for (Eigen::Index i = 0; i < count; ++i) {
       const Simplex simplex = Read(ids, i);
       if (*std::max_element(simplex.begin(), simplex.end()) >= vertices) return false;
@@ -37,9 +38,13 @@ class FixedSet final : public SimplexSet {
         free_ = nodes_[place].next;
       }
       nodes_[place] = {simplex, first_of_[simplex[0]]};
-      if (turned != nullptr) {
+      if (marks.turned != nullptr) {
         turned_.resize(nodes_.size());
-        turned_[place] = (turned[i / 8] >> (i % 8) & 1) != 0;
+        turned_[place] = (marks.turned[i / 8] >> (i % 8) & 1) != 0;
+      }
+      if (marks.labels != nullptr) {
+        labels_.resize(nodes_.size());
+        labels_[place] = static_cast<std::uint8_t>(marks.labels[i]);
       }
       first_of_[simplex[0]] = place;
       ++size_;
@@ -64,22 +69,26 @@ class FixedSet final : public SimplexSet {
   }
 
   std::optional<Simplices> Sorted() const override {
-    Simplices sorted{SimplexMatrix(N, static_cast<Eigen::Index>(size_)), {}};
+    Simplices sorted{SimplexMatrix(N, static_cast<Eigen::Index>(size_)), {}, {}};
     if (!turned_.empty()) sorted.turned.assign((size_ + 7) / 8, 0);
+    if (!labels_.empty()) sorted.labels.assign(size_, 0);
     size_t column = 0;
-    std::vector<std::pair<Simplex, bool>> star;
+    std::vector<std::pair<Simplex, std::uint32_t>> star;  // and their nodes
     for (const std::uint32_t first : first_of_) {
       star.clear();
       for (std::uint32_t s = first; s != kNone; s = nodes_[s].next) {
-        star.emplace_back(nodes_[s].simplex, s < turned_.size() && turned_[s]);
+        star.emplace_back(nodes_[s].simplex, s);
       }
       std::sort(star.begin(), star.end());
       for (size_t i = 0; i < star.size(); ++i) {
-        const Simplex& simplex = star[i].first;
+        const auto& [simplex, node] = star[i];
         if (i > 0 && AreEqual(simplex, star[i - 1].first)) return std::nullopt;
         std::copy(simplex.begin(), simplex.end(),
                   sorted.columns.col(static_cast<Eigen::Index>(column)).begin());
-        if (star[i].second) sorted.turned[column / 8] |= static_cast<std::uint8_t>(1 << column % 8);
+        if (node < turned_.size() && turned_[node]) {
+          sorted.turned[column / 8] |= static_cast<std::uint8_t>(1 << column % 8);
+        }
+        if (node < labels_.size()) sorted.labels[column] = labels_[node];
         ++column;
       }
     }
@@ -109,8 +118,9 @@ class FixedSet final : public SimplexSet {
 
   std::vector<std::uint32_t> first_of_;  // by vertex
   std::vector<Node> nodes_;
-  std::vector<bool> turned_;    // by node, as far as any was
-  std::uint32_t free_ = kNone;  // a list of its own
+  std::vector<bool> turned_;          // by node, as far as any was
+  std::vector<std::uint8_t> labels_;  // by node, as far as any has one
+  std::uint32_t free_ = kNone;        // a list of its own
   size_t size_ = 0;
 };
 
@@ -201,6 +211,7 @@ Expected<void> DeltaMesh::Add(v1::DownloadMeshResponse&& part) {
   delta.mutable_added()->Swap(part.mutable_cells());
   delta.mutable_boundary_vertices()->Swap(part.mutable_boundary_vertices());
   delta.mutable_boundary_walls()->Swap(part.mutable_boundary_walls());
+  delta.mutable_added_labels()->swap(*part.mutable_cell_labels());
   const std::uint64_t cells = delta.added().shape_size() > 0 ? delta.added().shape(0) : 0;
   const v1::Orientation& orientation = part.orientation();
   const bool has_bits = orientation.orientable();
@@ -242,10 +253,15 @@ Expected<void> DeltaMesh::Apply(const v1::MeshDelta& delta, const char* turned) 
   if (!removed) return tl::unexpected(removed.error());
   const Expected<Eigen::Index> added = CountRows(delta.added(), width);
   if (!added) return tl::unexpected(added.error());
+  const std::string& labels = delta.added_labels();
+  if (!labels.empty() && labels.size() != static_cast<size_t>(*added)) {
+    return tl::unexpected(BrokenProtocol("labels that do not fit their simplices"));
+  }
   if (!simplex_set_->Remove(delta.removed().data().data(), *removed)) {
     return tl::unexpected(BrokenProtocol("the removal of a simplex that is not there"));
   }
-  if (!simplex_set_->Add(delta.added().data().data(), *added, vertices(), turned)) {
+  const SimplexSet::Marks marks{turned, labels.empty() ? nullptr : labels.data()};
+  if (!simplex_set_->Add(delta.added().data().data(), *added, vertices(), marks)) {
     return tl::unexpected(BrokenProtocol("a simplex with a vertex that it never sent"));
   }
   return {};
@@ -268,6 +284,7 @@ Expected<Mesh> DeltaMesh::Take() const {
   mesh.points = Eigen::Map<const Eigen::MatrixXd>(
       coordinates_.data(), d_, static_cast<Eigen::Index>(coordinates_.size()) / d_);
   mesh.simplices = std::move(simplices->columns);
+  mesh.labels = std::move(simplices->labels);
   mesh.orientation = orientation_;
   if (orientation_ && parts_simplices_ > 0) mesh.orientation->turned = std::move(simplices->turned);
   const auto count = static_cast<size_t>(mesh.simplices.cols());

@@ -19,18 +19,22 @@ class SimplexSet {
  public:
   virtual ~SimplexSet() = default;
   virtual std::size_t bytes() const = 0;
+  // What is known of simplices besides their ids; null where it is not.
+  struct Marks {
+    const char* turned = nullptr;  // a bit for each, as Orientation has them
+    const char* labels = nullptr;  // a byte for each, its region's
+  };
   // `count` simplices of k+1 uint32 each; `ids` need not be aligned. False, and the set is spoilt,
   // where a vertex is not below `vertices`.
-  // `turned`: a bit for each, as Orientation has them; null: none is.
   virtual bool Add(const char* ids, Eigen::Index count, std::uint64_t vertices,
-                   const char* turned = nullptr) = 0;
+                   const Marks& marks) = 0;
   // False, and the set is spoilt, where one is not there.
   virtual bool Remove(const char* ids, Eigen::Index count) = 0;
-  // (k+1) x m, columns in ascending order, and which of them are turned; nothing where one is there
-  // twice.
+  // (k+1) x m, columns in ascending order, which of them are turned, and their labels where they
+  // have any; nothing where one is there twice.
   struct Simplices {
     SimplexMatrix columns;
-    std::vector<std::uint8_t> turned;
+    std::vector<std::uint8_t> turned, labels;
   };
   virtual std::optional<Simplices> Sorted() const = 0;
 };

@@ -1,6 +1,8 @@
 #include "wire/convert.h"
 
+#include <algorithm>
 #include <bit>
+#include <cstddef>
 #include <cstring>
 #include <string>
 #include <string_view>
@@ -82,6 +84,23 @@ std::string FirstCharacters(std::string_view utf8, size_t most) {
   return std::string(utf8.substr(0, end));
 }
 
+// Servers take labels of so many walls, and say so of more.
+constexpr int kMostWithLabels = 16;
+constexpr std::uint8_t kHighestLabel = 127;
+
+Expected<void> CheckLabels(const std::vector<std::uint8_t>& labels, int walls) {
+  if (labels.empty()) return {};
+  if (labels.size() != std::size_t{1} << std::min(walls, kMostWithLabels)) {
+    return Invalid("there are " + std::to_string(labels.size()) + " labels, and " +
+                   std::to_string(walls) + " walls have 2^" + std::to_string(walls) +
+                   " vectors of signs: give one for each");
+  }
+  if (*std::max_element(labels.begin(), labels.end()) > kHighestLabel) {
+    return Invalid("labels have to be numbers from 0, outside of M, to 127");
+  }
+  return {};
+}
+
 }  // namespace
 
 Expected<void> CheckServable(const Oracle& oracle, std::optional<std::uint32_t> max_chunk) {
@@ -100,7 +119,7 @@ Expected<void> CheckServable(const Oracle& oracle, std::optional<std::uint32_t> 
     return Invalid("the oracle has walls, and lacks tangent bases");
   }
   if (max_chunk == 0u) return Invalid("max_chunk is 0 but must be 1 or more");
-  return {};
+  return CheckLabels(oracle.labels(), oracle.walls());
 }
 
 Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
@@ -121,6 +140,8 @@ Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
   spec.mutable_oracle()->set_conormals(oracle.walls() > 0);
   spec.mutable_oracle()->set_about(FirstCharacters(oracle.about(), kMostAboutItself));
   spec.set_walls(static_cast<std::uint32_t>(oracle.walls()));
+  const std::vector<std::uint8_t> labels = oracle.labels();
+  spec.set_labels(labels.data(), labels.size());
   if (const auto box = oracle.bounding_box()) {
     // Shape [d]: a corner is one point, not a list of them.
     for (const auto& [corner, array] :

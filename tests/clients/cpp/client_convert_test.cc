@@ -341,6 +341,27 @@ TEST(DeltaMesh, TakesARevisionOnceAndWhole) {
   EXPECT_FALSE(builder->Absorb(Delta(8, 3, Eigen::MatrixXd(2, 0), {}, {})));
 }
 
+TEST(DeltaMesh, LabelsStayWithTheirSimplices) {
+  auto builder = DeltaMesh::Create(1, 2);
+  ASSERT_TRUE(builder.has_value());
+  const auto labelled = [](v1::DeltaChunk chunk, const std::string& labels) {
+    chunk.mutable_delta()->set_added_labels(labels);
+    return chunk;
+  };
+  const Eigen::MatrixXd points = Eigen::MatrixXd::Random(2, 4), none(2, 0);
+  ASSERT_TRUE(
+      builder->Absorb(labelled(Delta(1, 0, points, {2, 3, 0, 1, 1, 2}, {}), std::string{3, 1, 2})));
+  EXPECT_EQ(builder->Take()->labels, (std::vector<std::uint8_t>{1, 2, 3}));
+  // 0 1 goes, its place is taken by 0 3, and 1 2 comes again with another label.
+  ASSERT_TRUE(
+      builder->Absorb(labelled(Delta(2, 4, none, {0, 3, 1, 2}, {0, 1, 1, 2}), std::string{4, 5})));
+  EXPECT_EQ(builder->Take()->labels, (std::vector<std::uint8_t>{4, 5, 3}));
+  EXPECT_FALSE(builder->Absorb(labelled(Delta(3, 4, none, {0, 1}, {}), std::string{1, 1})));
+  auto plain = DeltaMesh::Create(1, 2);
+  ASSERT_TRUE(plain->Absorb(Delta(1, 0, points, {0, 1}, {})));
+  EXPECT_TRUE(plain->Take()->labels.empty());
+}
+
 TEST(DeltaMesh, BeginsAnewWhenTheServerDoes) {
   auto builder = DeltaMesh::Create(1, 2);
   ASSERT_TRUE(builder.has_value());

@@ -37,11 +37,17 @@ struct Mesh {
   // As the server says of a mesh that is over, for `simplices` as they are; else none. Clear it
   // when you change them.
   std::optional<Orientation> orientation = {};
+  // Of an arrangement of walls, m: the region that each simplex is in; else empty.
+  std::vector<std::uint8_t> labels = {};
+
+  // The part with one label, of the same points. Its boundary is where it ends or meets others.
+  // Throws std::invalid_argument where no simplex has the label.
+  Mesh Region(int label) const;
 
   // The faces of a manifold with boundary, by ascending walls: the boundary's parts, one for each
   // wall, of dimension k - 1; curves where two walls meet or more; points where k walls meet; and
-  // those of any dimension below k.
-  std::vector<Face> boundary() const { return faces(dimension() - 1); }
+  // those of any dimension below k. What lies between two regions is among all but the boundary.
+  std::vector<Face> boundary() const;
   std::vector<Face> edges() const;
   std::vector<Face> corners() const;
   std::vector<Face> faces(int dimension) const;
@@ -61,11 +67,12 @@ struct Mesh {
   //   .vtu  k <= 3; beyond d = 3 the first three coordinates, and all as point data "coordinates";
   //         field data "epsilon", "certified" (0 or 1), "verdict" and "version" (UTF-8 bytes)
   // Of a mesh with boundary .msh, .vtu and .obj have its faces too, of all dimensions, after its
-  // simplices: in .msh as physical groups "inside", "wall_0", ..., "walls_0_1", ...; in .obj as
-  // groups of the same names; in .vtu with cell data "walls", the walls as bits (0 inside), and
-  // "group", .msh's number of it, and point data "walls".
-  // All but .txt are oriented as by OrientedSimplices(mesh). The file is replaced when the new one
-  // is whole. kFileFailed when the format cannot hold the mesh or the file cannot be written.
+  // simplices: in .msh as physical groups "inside", or "region_1" for label 1 where there are
+  // several, "wall_0", ..., "walls_0_1", ...; in .obj as groups of the same names; in .vtu with
+  // cell data "walls", the walls as bits (0 inside), and "group", .msh's number of it, and point
+  // data "walls". Faces between regions are among them, turned outwards from the lower label. All
+  // but .txt are oriented as by OrientedSimplices(mesh). The file is replaced when the new one is
+  // whole. kFileFailed when the format cannot hold the mesh or the file cannot be written.
   Expected<void> Save(const std::string& path) const;
 };
 

@@ -124,6 +124,12 @@ class Oracle {
     throw std::logic_error("this oracle has no walls");
   }
 
+  // An arrangement: M is not where all walls are positive, but consists of a region for each label
+  // from 1 to 127. One for each of the 2^walls() vectors of the walls' signs, in whose number bit i
+  // is set where g_i >= 0; 0 is outside of M. All regions are meshed together, and Mesh::labels
+  // says which simplex is in which. At most 16 walls may have labels. Empty: no arrangement.
+  virtual std::vector<std::uint8_t> labels() const { return {}; }
+
   // Where to look for M: a box, or points near M, at least one on each component.
   virtual std::optional<BoundingBox> bounding_box() const { return std::nullopt; }
   virtual Eigen::MatrixXd seeds() const { return {}; }  // d x m

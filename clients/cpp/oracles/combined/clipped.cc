@@ -11,7 +11,7 @@ namespace {
 
 using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
 
-constexpr size_t kMaxWalls = 64;
+constexpr size_t kMaxWalls = 64, kMaxWallsWithLabels = 16;
 
 // All of R^d, as a manifold that is to be cut by walls.
 class Space final : public Oracle {
@@ -80,10 +80,17 @@ Wall Ball(const VectorXd& centre, double radius) {
       [centre](const VectorXd& x) -> VectorXd { return -2 * (x - centre); }};
 }
 
-Clipped::Clipped(std::shared_ptr<Oracle> oracle, std::vector<Wall> walls, MatrixXd seeds)
-    : base_(std::move(oracle)), walls_(std::move(walls)), seeds_(std::move(seeds)) {
+Clipped::Clipped(std::shared_ptr<Oracle> oracle, std::vector<Wall> walls, MatrixXd seeds,
+                 std::vector<std::uint8_t> labels)
+    : base_(std::move(oracle)),
+      walls_(std::move(walls)),
+      seeds_(std::move(seeds)),
+      labels_(std::move(labels)) {
   if (base_ == nullptr) Refuse("there is no oracle to clip");
   if (const auto* const clipped = dynamic_cast<const Clipped*>(base_.get())) {
+    if (!clipped->labels_.empty()) {
+      Refuse("what has labels cannot be clipped: give all walls to one Clipped");
+    }
     walls_.insert(walls_.begin(), clipped->walls_.begin(), clipped->walls_.end());
     if (seeds_.size() == 0) seeds_ = clipped->seeds_;
     base_ = std::shared_ptr<Oracle>(clipped->base_);
@@ -95,6 +102,12 @@ Clipped::Clipped(std::shared_ptr<Oracle> oracle, std::vector<Wall> walls, Matrix
   }
   for (const Wall& wall : walls_) {
     if (!wall.g) Refuse("walls have to be functions");
+  }
+  if (!labels_.empty() &&
+      (walls_.size() > kMaxWallsWithLabels || labels_.size() != std::size_t{1} << walls_.size())) {
+    Refuse("there are " + std::to_string(labels_.size()) +
+           " labels; there has to be one for each of "
+           "the vectors of signs of at most 16 walls");
   }
   if (seeds_.size() == 0) seeds_ = base_->seeds();
   if (seeds_.size() > 0 && seeds_.rows() != ambient_dimension()) {
@@ -180,7 +193,9 @@ MatrixXd Clipped::Conormals(const MatrixXd& points, const Walls& face) {
   return outward;
 }
 
-Solid::Solid(std::vector<Wall> walls, BoundingBox around, MatrixXd seeds)
-    : Clipped(std::make_shared<Space>(std::move(around)), std::move(walls), std::move(seeds)) {}
+Solid::Solid(std::vector<Wall> walls, BoundingBox around, MatrixXd seeds,
+             std::vector<std::uint8_t> labels)
+    : Clipped(std::make_shared<Space>(std::move(around)), std::move(walls), std::move(seeds),
+              std::move(labels)) {}
 
 }  // namespace stellate::oracles

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <optional>
@@ -41,11 +42,15 @@ class Clipped : public Oracle {
  public:
   // Of M, with tangent bases; 1 to 64 walls. Those of an oracle that is Clipped itself come first.
   // `seeds` (d x s) are points near what is left, where M's box or seeds are not to be gone by.
-  Clipped(std::shared_ptr<Oracle> oracle, std::vector<Wall> walls, Eigen::MatrixXd seeds = {});
+  // `labels`, as Oracle::labels has them: the part of M with labels other than 0 instead of what is
+  // positive. What has labels cannot be clipped.
+  Clipped(std::shared_ptr<Oracle> oracle, std::vector<Wall> walls, Eigen::MatrixXd seeds = {},
+          std::vector<std::uint8_t> labels = {});
 
   int dimension() const override { return base_->dimension(); }
   int ambient_dimension() const override { return base_->ambient_dimension(); }
   int walls() const override { return static_cast<int>(walls_.size()); }
+  std::vector<std::uint8_t> labels() const override { return labels_; }
   // Of M, whatever the walls say.
   Answer ClosestPoint(const Eigen::MatrixXd& x) override { return base_->ClosestPoint(x); }
   bool has_intersect_flat() const override;
@@ -80,13 +85,16 @@ class Clipped : public Oracle {
   std::vector<Wall> walls_;
   std::vector<std::shared_ptr<const Exactness>> exactness_;  // of each wall
   Eigen::MatrixXd seeds_;
+  std::vector<std::uint8_t> labels_;
   double scale_ = 1;  // of where M is: the unit of lengths
 };
 
 // {x in R^d : g(x) >= 0 for all walls g}, as a manifold of dimension d with boundary.
 class Solid final : public Clipped {
  public:
-  Solid(std::vector<Wall> walls, BoundingBox around, Eigen::MatrixXd seeds = {});
+  // `seeds` and `labels` as Clipped takes them.
+  Solid(std::vector<Wall> walls, BoundingBox around, Eigen::MatrixXd seeds = {},
+        std::vector<std::uint8_t> labels = {});
 };
 
 // A manifold with boundary, from nearest points of it and nearest points of its boundary.
