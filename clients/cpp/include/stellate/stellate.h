@@ -16,4 +16,5 @@
 #include "stellate/oracles/walls.h"
 #include "stellate/pointwise.h"
 #include "stellate/serve.h"
+#include "stellate/solids.h"
 #include "stellate/version.h"
