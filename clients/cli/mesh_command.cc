@@ -29,7 +29,8 @@ class ClosestPointOnly final : public Oracle {
 }  // namespace
 
 MeshCommand::MeshCommand(CLI::App& parent)
-    : command_(parent.add_subcommand("mesh", "Mesh a manifold of the catalogue, or of a command")),
+    : command_(parent.add_subcommand(
+          "mesh", "Mesh a manifold of the catalogue, a solid, or the manifold of a command")),
       source_(command_),
       server_(command_, ""),
       spec_(command_, /*serves=*/true) {

@@ -8,6 +8,7 @@
 
 #include "stellate/catalogue.h"
 #include "stellate/oracles/walls.h"
+#include "stellate/solids.h"
 
 namespace stellate::cli {
 
@@ -72,23 +73,82 @@ tl::unexpected<Error> NoSuch(const std::string& why) {
   return Fail(ErrorCode::kRefused, why + "; 'stellate list' shows what there is");
 }
 
+constexpr const char* kSolids =
+    "ball(radius, at=), box(lower, upper), cylinder(axis, radius, height, at=), cone, torus, "
+    "capsule, halfspace and blend, joined by & | - ^ ~, moved by .at(x, y, z), .rotated(axis, "
+    "degrees), .scaled(factor), .offset(distance): docs/using/solids.md";
+
+Expected<solids::Solid> Parse(const std::string& option, const std::string& expression) {
+  Expected<solids::Solid> solid = solids::ParseSolid(expression);
+  if (!solid) return Fail(ErrorCode::kRefused, option + ": " + solid.error().message);
+  return solid;
+}
+
+// Throws std::invalid_argument for materials that cannot be meshed together.
+Expected<std::unique_ptr<Oracle>> ParseMaterials(const std::vector<std::string>& given) {
+  std::vector<std::pair<std::string, solids::Solid>> materials;
+  for (const std::string& material : given) {
+    const size_t equals = material.find('=');
+    const std::string name = material.substr(0, equals);
+    const bool plain = name.find_first_not_of(
+                           "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
+                           "0123456789_-") == std::string::npos;
+    if (equals == std::string::npos || name.empty() || !plain) {
+      return Fail(ErrorCode::kRefused,
+                  "--material " + material +
+                      ": has to be NAME=SOLID, the name of letters, digits, _ and -");
+    }
+    Expected<solids::Solid> solid = Parse("--material " + name, material.substr(equals + 1));
+    if (!solid) return tl::unexpected(solid.error());
+    materials.emplace_back(name, std::move(*solid));
+  }
+  return std::make_unique<solids::Labels>(std::move(materials));
+}
+
+Expected<std::unique_ptr<Oracle>> ParseSolid(const std::string& expression) {
+  Expected<solids::Solid> solid = Parse("--solid", expression);
+  if (!solid) return tl::unexpected(solid.error());
+  return std::make_unique<solids::Solid>(std::move(*solid));
+}
+
 }  // namespace
 
 OracleSource::OracleSource(CLI::App* command) {
   CLI::Option* const manifold = command->add_option(
-      "manifold", manifold_, "e.g. torus:1:0.4; see 'stellate list'. Or, instead of it, a command");
+      "manifold", manifold_,
+      "e.g. torus:1:0.4; see 'stellate list'. Or, instead of it, a solid or a command");
+  CLI::Option* const solid =
+      command
+          ->add_option("--solid", solid_,
+                       std::string("a solid in words, e.g. \"box(-1, 1) & ball(1.3) - cylinder(x, "
+                                   "0.5)\": ") +
+                           kSolids)
+          ->type_name("SOLID")
+          ->excludes(manifold);
+  CLI::Option* const material =
+      command
+          ->add_option(
+              "--material", materials_,
+              "several materials, once for each, as --material \"grain=ball(0.6)\": regions "
+              "1, 2, ... of the mesh; where they overlap the later one wins")
+          ->type_name("NAME=SOLID")
+          ->allow_extra_args(false)
+          ->excludes(manifold)
+          ->excludes(solid);
   command
       ->add_option("--clip", clips_,
                    "what is left of it inside a wall, with a boundary there; may be given again. " +
                        std::string(kClips) + ", as --clip=half-space:0,0,1:0.2")
       ->type_name("WALL")
-      ->allow_extra_args(false);
+      ->allow_extra_args(false)
+      ->excludes(solid)
+      ->excludes(material);
   CLI::App* const group = command->add_option_group(
       "Oracle command",
       "a program in any language that answers batches of queries: docs/using/pipe.md");
   CLI::Option* const oracle = group->add_option("--oracle-command", command_.command,
                                                 "for the shell, e.g. \"octave-cli -q torus.m\"");
-  oracle->excludes(manifold);
+  oracle->excludes(manifold)->excludes(solid)->excludes(material);
   const auto add = [&](const std::string& flags, auto& value, const std::string& help) {
     return group->add_option(flags, value, help)->needs(oracle);
   };
@@ -129,9 +189,29 @@ Expected<std::unique_ptr<Oracle>> OracleSource::Make(std::stop_token stop) {
   return Clip(std::move(*made), clips_);
 }
 
+std::string OracleSource::name() const {
+  if (!command_.command.empty()) return command_.command;
+  if (!solid_.empty()) return solid_;
+  std::string all = manifold_;
+  for (const std::string& material : materials_) all += (all.empty() ? "" : ", ") + material;
+  return all;
+}
+
+// What is wrong with a solid is said before anything else is done with it.
+Expected<std::unique_ptr<Oracle>> OracleSource::MakeSolid() const {
+  try {
+    auto made = materials_.empty() ? ParseSolid(solid_) : ParseMaterials(materials_);
+    if (made) (*made)->walls();
+    return made;
+  } catch (const std::invalid_argument& refusal) {
+    return Fail(ErrorCode::kRefused, refusal.what());
+  }
+}
+
 Expected<std::unique_ptr<Oracle>> OracleSource::MakeUnclipped(std::stop_token stop) {
+  if (!solid_.empty() || !materials_.empty()) return MakeSolid();
   if (command_.command.empty()) {
-    if (manifold_.empty()) return NoSuch("name a manifold, or give --oracle-command");
+    if (manifold_.empty()) return NoSuch("name a manifold, or give --solid or --oracle-command");
     Expected<std::unique_ptr<Oracle>> domain = oracles::MakeDomain(manifold_);
     if (domain) return domain;
     if (domain.error().reason != "UNKNOWN_NAME") return NoSuch(domain.error().message);

@@ -12,8 +12,8 @@
 
 namespace stellate::cli {
 
-// Whose manifold it is: one of the catalogue's, or that of a command (see docs/using/pipe.md), and
-// what walls leave of it.
+// Whose manifold it is: one of the catalogue's, what walls leave of it, a solid or several
+// materials (docs/using/solids.md), or that of a command (docs/using/pipe.md).
 class OracleSource {
  public:
   explicit OracleSource(CLI::App* command);
@@ -22,18 +22,17 @@ class OracleSource {
   Expected<std::unique_ptr<Oracle>> Make(std::stop_token stop);
 
   // For labels and messages.
-  const std::string& name() const {
-    return command_.command.empty() ? manifold_ : command_.command;
-  }
+  std::string name() const;
   // How many of them answer at the same time; 1 for the catalogue's.
   int processes() const { return command_.processes; }
 
  private:
   Expected<void> ReadWhereabouts();
+  Expected<std::unique_ptr<Oracle>> MakeSolid() const;
   Expected<std::unique_ptr<Oracle>> MakeUnclipped(std::stop_token stop);
 
-  std::string manifold_, box_;
-  std::vector<std::string> seeds_, clips_;
+  std::string manifold_, solid_, box_;
+  std::vector<std::string> seeds_, clips_, materials_;
   CommandOptions command_;
 };
 

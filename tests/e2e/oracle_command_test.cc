@@ -161,7 +161,7 @@ TEST_F(OracleCommand, DoctorExaminesCommands) {
 TEST_F(OracleCommand, UsageIsChecked) {
   const std::string torus = "--oracle-command 'perl " + Shipped("torus.pl") + "'";
   for (const auto& [arguments, words] : {
-           std::pair{"mesh -e 0.2", "name a manifold, or give --oracle-command"},
+           std::pair{"mesh -e 0.2", "name a manifold, or give --solid or --oracle-command"},
            {"mesh torus -e 0.2 --box=-1,-1,-1:1,1,1", "--box requires --oracle-command"},
            {"mesh torus -e 0.2 TORUS", "excludes"},
            {"mesh -e 0.2 TORUS -k 1", "says k=2, and the options 1"},
