@@ -7,32 +7,52 @@ import (
 )
 
 // Check probes an oracle for its contract, before a mesh is made of its answers; what the oracle
-// returns as an error is a finding, too. epsilon is what a mesh is planned with, 0: nothing yet. The
-// program stellate asks the questions, for clients in all languages alike; doctor.proto says what the
-// report has.
+// returns as an error is a finding, too. epsilon is what a mesh is planned with, 0: nothing yet. A
+// private server asks the questions; doctor.proto says what the report has. See Client.Check for
+// another server.
 func Check(ctx context.Context, oracle Oracle, epsilon float64) (*pb.CheckReport, error) {
-	doctor, err := startDoctor()
+	server, err := StartServer(ServerOptions{})
 	if err != nil {
 		return nil, err
 	}
-	defer doctor.Close()
-	client, err := NewClient(Connection{Own: doctor})
+	defer server.Close()
+	client, err := NewClient(Connection{Own: server})
 	if err != nil {
 		return nil, err
 	}
 	defer client.Close()
-	info, err := client.Create(ctx, oracle, epsilon, nil)
+	return client.Check(ctx, oracle, epsilon)
+}
+
+// Check has this server examine an oracle: see the function Check.
+func (c *Client) Check(ctx context.Context, oracle Oracle, epsilon float64) (*pb.CheckReport, error) {
+	checked, err := check(oracle)
 	if err != nil {
 		return nil, err
 	}
-	_, failure := client.Serve(ctx, oracle, info.GetName(), WorkerOptions{})
-	stub := pb.NewDoctorClient(client.connection)
-	request := &pb.GetCheckReportRequest{Name: info.GetName()}
-	report, err := call(ctx, client.outage(), true, request, stub.GetCheckReport)
-	if err != nil && failure != nil {
-		return nil, failure // there was no examination
+	within, cancel := context.WithCancel(ctx)
+	defer cancel()
+	spec := meshSpec(checked, epsilon, &Options{}, false)
+	stream, err := c.stub.Examine(within, &pb.ExamineRequest{Spec: spec})
+	if err != nil {
+		return nil, fromRPC(err)
 	}
-	return report, err
+	var failure error
+	for {
+		response, err := stream.Recv()
+		if err != nil {
+			if failure != nil {
+				return nil, failure // there was no examination
+			}
+			return nil, fromRPC(err)
+		}
+		if mesh := response.GetMesh(); mesh != nil {
+			_, failure = c.Serve(ctx, oracle, mesh.GetName(), WorkerOptions{})
+		}
+		if report := response.GetReport(); report != nil {
+			return report, nil
+		}
+	}
 }
 
 // ChooseEpsilon gives a quarter of the reach that Check finds, to two digits, and a word about it. It is

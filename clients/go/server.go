@@ -57,21 +57,6 @@ func FindStellated() (string, error) {
 			"binary, or put it on PATH, or build it (clients/quickstart does)")
 }
 
-// FindStellate gives the command-line program: beside the server binary, else on PATH.
-func FindStellate() (string, error) {
-	if server, err := FindStellated(); err == nil {
-		if path, err := exec.LookPath(filepath.Join(filepath.Dir(server), "stellate")); err == nil {
-			return path, nil
-		}
-	}
-	if path, err := exec.LookPath("stellate"); err == nil {
-		return path, nil
-	}
-	return "", newError(ErrServerNotFound, "SERVER_NOT_FOUND",
-		"the program stellate, which examines oracles, is neither beside stellated nor on PATH: install it, or "+
-			"build it (clients/quickstart does)")
-}
-
 // StartServer starts a server, and returns when it listens.
 func StartServer(options ServerOptions) (*Server, error) {
 	binary := options.Binary
@@ -87,19 +72,10 @@ func StartServer(options ServerOptions) (*Server, error) {
 		// One that answers no pings is merely busy in an oracle.
 		flags = append(flags, "--keepalive", "600", "--keepalive-timeout", "600")
 	}
-	return launch(binary, nil, append(flags, options.Flags...), options.Listen)
+	return launch(binary, append(flags, options.Flags...), options.Listen)
 }
 
-// startDoctor starts the doctor, to which an oracle is served as to a server: see Check.
-func startDoctor() (*Server, error) {
-	binary, err := FindStellate()
-	if err != nil {
-		return nil, err
-	}
-	return launch(binary, []string{"doctor"}, nil, "")
-}
-
-func launch(binary string, words, flags []string, listen string) (*Server, error) {
+func launch(binary string, flags []string, listen string) (*Server, error) {
 	folder, err := os.MkdirTemp("", "stellate-")
 	if err != nil {
 		return nil, err
@@ -108,7 +84,7 @@ func launch(binary string, words, flags []string, listen string) (*Server, error
 	if address == "" {
 		address = "unix:" + filepath.Join(folder, "socket")
 	}
-	words = append(append(words, "--exit-with-parent", "--listen", address), flags...)
+	words := append([]string{"--exit-with-parent", "--listen", address}, flags...)
 	s := &Server{private: listen == "", folder: folder, ended: make(chan struct{})}
 	s.command = exec.Command(binary, words...)
 	s.command.Stderr = &s.words

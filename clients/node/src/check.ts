@@ -1,11 +1,11 @@
-// The doctor: whether an oracle is what it should be, and how large epsilon may be. The program
-// `stellate` asks the questions, for clients in all languages alike.
+// Whether an oracle is what it should be, and how large epsilon may be. A private server asks the
+// questions, for clients in all languages alike.
 import { Client } from "./client.js";
-import { errorClass, fromRpc, OracleError } from "./errors.js";
+import { errorClass, OracleError } from "./errors.js";
 import type { CheckReport__Output } from "./generated/stellate/v1/CheckReport.js";
 import type { Oracle } from "./oracle.js";
 import { Server } from "./server.js";
-import { DoctorStub, enumName, grpc } from "./wire.js";
+import { enumName } from "./wire.js";
 
 /** One thing that was found. */
 export interface Finding {
@@ -67,30 +67,12 @@ export async function chooseEpsilon(oracle: Oracle): Promise<{ epsilon: number; 
 }
 
 async function examine(oracle: Oracle, epsilon: number): Promise<CheckReport__Output> {
-  const doctor = await Server.startDoctor();
-  const client = new Client(doctor);
+  const server = await Server.start();
+  const client = new Client(server);
   try {
-    const { name } = await client.create(oracle, { epsilon });
-    let failure: unknown;
-    await client.serve(oracle, name).catch((error: unknown) => (failure = error));
-    const report = await fetchReport(doctor.address, name);
-    if (report instanceof Error) throw (failure ?? fromRpc(report)) as Error;
-    return report;
+    return await client.examine(oracle, epsilon);
   } finally {
     client.close();
-    await doctor.close();
+    await server.close();
   }
-}
-
-function fetchReport(
-  address: string,
-  name: string,
-): Promise<CheckReport__Output | grpc.ServiceError> {
-  const stub = new DoctorStub(address, grpc.credentials.createInsecure());
-  return new Promise((resolve) =>
-    stub.getCheckReport({ name }, (error, report) => {
-      stub.close();
-      resolve(error ?? (report as CheckReport__Output));
-    }),
-  );
 }

@@ -1,8 +1,10 @@
 // The service call by call, for those who need more than mesh().
 import { channelCredentials, type Credentials, staysOnThisMachine } from "./credentials.js";
 import { tokenInterceptor } from "./credentials.js";
-import { fromRpc, InvalidArgument, MeshNotFound, StellateError } from "./errors.js";
+import { fromRpc, InvalidArgument, MeshNotFound, protocolError, StellateError } from "./errors.js";
+import type { CheckReport__Output } from "./generated/stellate/v1/CheckReport.js";
 import type { DownloadMeshResponse__Output } from "./generated/stellate/v1/DownloadMeshResponse.js";
+import type { ExamineResponse__Output } from "./generated/stellate/v1/ExamineResponse.js";
 import type { MeshSpec } from "./generated/stellate/v1/MeshSpec.js";
 import type { Mesh__Output } from "./generated/stellate/v1/Mesh.js";
 import type { ServerInfo__Output } from "./generated/stellate/v1/ServerInfo.js";
@@ -136,6 +138,23 @@ export class Client {
   async info(): Promise<ServerInfo__Output> {
     const call: Unary<object, ServerInfo__Output> = this.stub.GetServerInfo.bind(this.stub);
     return this.unary(call, {});
+  }
+
+  /** Has this server examine an oracle: see check(). */
+  async examine(oracle: Oracle, epsilon: number): Promise<CheckReport__Output> {
+    const call = this.stub.Examine({ spec: this.specOf(oracle, { epsilon }) });
+    let failure: unknown;
+    try {
+      for await (const response of call) {
+        const { mesh, report } = response as ExamineResponse__Output;
+        if (report) return report;
+        if (!mesh) continue;
+        await this.serve(oracle, mesh.name).catch((error: unknown) => (failure = error));
+      }
+    } catch (error) {
+      throw (failure ?? fromRpc(error as grpc.ServiceError)) as Error; // there was no examination
+    }
+    throw protocolError("it ended an examination without a report");
   }
 
   /** Serves a mesh with this oracle until it is over; the state it ended in, e.g. "SUCCEEDED". */

@@ -9,7 +9,7 @@ import { fileURLToPath } from "node:url";
 import { ServerNotFound, StellateError, Unavailable } from "./errors.js";
 
 const STOP_MILLISECONDS = 10_000;
-const SAID = /^stellated? (?:doctor )?listening on (.*)$/;
+const SAID = /^stellated listening on (.*)$/;
 // When its client goes there is nobody left to finish a mesh for. One that answers no pings is
 // merely busy in an oracle that does not let go of the event loop.
 const OWN_FLAGS = ["--drain-seconds", "0"];
@@ -54,22 +54,6 @@ export function findStellated(): string {
   );
 }
 
-/** The command-line program: beside the server binary, else on PATH. */
-export function findStellate(): string {
-  const folders = (process.env.PATH ?? "").split(delimiter);
-  try {
-    folders.unshift(dirname(findStellated()));
-  } catch {
-    // One that is on PATH without its server will do.
-  }
-  const path = folders.map((folder) => join(folder, "stellate")).find(runs);
-  if (path) return path;
-  throw new ServerNotFound(
-    "the program 'stellate', which examines oracles, is neither beside stellated nor on PATH: " +
-      "install it, or build it (clients/quickstart does)",
-  );
-}
-
 /** A stellated of this process's own, which ends with it whatever happens. */
 export class Server {
   private words = "";
@@ -87,23 +71,13 @@ export class Server {
    */
   static async start({ flags = [] as string[], binary = "", listen = "" } = {}): Promise<Server> {
     const own = [...OWN_FLAGS, ...(listen ? [] : PRIVATE_FLAGS), ...flags];
-    return Server.launch(binary || findStellated(), [], own, listen);
+    return Server.launch(binary || findStellated(), own, listen);
   }
 
-  /** The doctor, to which an oracle is served as to a server: see check(). */
-  static async startDoctor(): Promise<Server> {
-    return Server.launch(findStellate(), ["doctor"], [], "");
-  }
-
-  private static async launch(
-    program: string,
-    command: string[],
-    flags: string[],
-    listen: string,
-  ): Promise<Server> {
+  private static async launch(program: string, flags: string[], listen: string): Promise<Server> {
     const folder = mkdtempSync(join(tmpdir(), "stellate-"));
     const address = listen || `unix:${join(folder, "socket")}`;
-    const all = [...command, "--exit-with-parent", "--listen", address, ...flags];
+    const all = ["--exit-with-parent", "--listen", address, ...flags];
     // A session of its own: Ctrl-C is for the client, which cancels its meshes first.
     const child = spawn(program, all, {
       stdio: ["ignore", "pipe", "pipe"],

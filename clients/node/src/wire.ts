@@ -6,7 +6,6 @@ import { fileURLToPath } from "node:url";
 import * as grpc from "@grpc/grpc-js";
 import { loadSync, type MessageTypeDefinition } from "@grpc/proto-loader";
 import protobuf from "protobufjs";
-import type { ProtoGrpcType as DoctorProto } from "./generated/doctor.js";
 import type { ProtoGrpcType } from "./generated/stellate.js";
 import type { Array as WireArray } from "./generated/stellate/v1/Array.js";
 import type { MeshSpec, MeshSpec__Output } from "./generated/stellate/v1/MeshSpec.js";
@@ -15,7 +14,7 @@ import type { StellateClient } from "./generated/stellate/v1/Stellate.js";
 if (endianness() !== "LE") throw new Error("stellate needs a little-endian machine");
 
 const folder = join(dirname(fileURLToPath(import.meta.url)), "..", "proto");
-const proto = loadSync(["stellate/v1/stellate.proto", "stellate/v1/doctor.proto"], {
+const proto = loadSync("stellate/v1/stellate.proto", {
   includeDirs: [folder],
   longs: Number,
   enums: String,
@@ -29,7 +28,6 @@ const services: unknown = grpc.loadPackageDefinition(proto);
 /** The service's stub. Enumerators that this version does not know are numbers, not errors. */
 export const Stub = (services as ProtoGrpcType).stellate.v1.Stellate;
 export type Stub = StellateClient;
-export const DoctorStub = (services as DoctorProto).stellate.v1.Doctor;
 
 /** A specification as the protocol's bytes, and back. */
 export const SpecBytes = proto["stellate.v1.MeshSpec"] as MessageTypeDefinition<

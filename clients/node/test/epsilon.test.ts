@@ -42,7 +42,7 @@ class TwoCircles implements stellate.Oracle {
     [-1.1, -1.1],
     [1.2, 1.1],
   ];
-  readonly seeds = Float64Array.of(-1, 0, 1.05, 0.005);
+  readonly seeds = Float64Array.of(-1, 0, 1.05, 0.01);
   asked = 0;
 
   closestPoint(x: Float64Array, n: number): Float64Array {
@@ -52,8 +52,8 @@ class TwoCircles implements stellate.Oracle {
       const away = Math.sqrt(x[i] * x[i] + x[i + 1] * x[i + 1]);
       const across = x[i] - 1.05;
       const beside = Math.sqrt(across * across + x[i + 1] * x[i + 1]);
-      const large = Math.abs(away - 1) <= Math.abs(beside - 0.005);
-      const [from, scale] = large ? [0, 1 / away] : [1.05, 0.005 / beside];
+      const large = Math.abs(away - 1) <= Math.abs(beside - 0.01);
+      const [from, scale] = large ? [0, 1 / away] : [1.05, 0.01 / beside];
       points.set([from + scale * (x[i] - from), scale * x[i + 1]], i);
     }
     return points;
