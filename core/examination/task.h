@@ -60,11 +60,10 @@ struct ValuePromise<void> : TaskPromise {
 template <typename T = void>
 class [[nodiscard]] Task {
  public:
-  struct promise_type : ValuePromise<T> {
-    Task get_return_object() {
-      return Task(std::coroutine_handle<promise_type>::from_promise(*this));
-    }
+  struct Promise : ValuePromise<T> {
+    Task get_return_object() { return Task(std::coroutine_handle<Promise>::from_promise(*this)); }
   };
+  using promise_type = Promise;  // as the language calls it
 
   Task(Task&& other) noexcept : handle_(std::exchange(other.handle_, {})) {}
   Task& operator=(Task&& other) noexcept {
@@ -88,9 +87,9 @@ class [[nodiscard]] Task {
   T result() { return handle_.promise().Take(); }  // REQUIRES: it is over
 
  private:
-  explicit Task(std::coroutine_handle<promise_type> handle) : handle_(handle) {}
+  explicit Task(std::coroutine_handle<Promise> handle) : handle_(handle) {}
 
-  std::coroutine_handle<promise_type> handle_;
+  std::coroutine_handle<Promise> handle_;
 };
 
 }  // namespace stellate::core::examination
