@@ -62,9 +62,9 @@ Clock::duration AgeOf(std::chrono::system_clock::time_point time) {
   return std::max(std::chrono::duration_cast<Clock::duration>(age), Clock::duration::zero());
 }
 
-Session::Session(SessionOptions options, MesherFactory factory)
+Session::Session(SessionOptions options, const MesherFactory& factory)
     : options_(std::move(options)),
-      factory_(options_.examiner ? options_.examiner : std::move(factory)),
+      factory_(options_.examiner ? options_.examiner : factory),
       pool_(request().spec, DispatchOptions{request().timeouts, policy().dispatch},
             policy().max_workers, ports().observer),
       history_(options_),

@@ -44,7 +44,7 @@ class Session {
  public:
   using MesherFactory = server::MesherFactory;
 
-  explicit Session(SessionOptions options, MesherFactory factory = core::Mesher::Create);
+  explicit Session(SessionOptions options, const MesherFactory& factory = core::Mesher::Create);
 
   // Meshes to the end, on the calling thread. Call it once, and not if Over() is true already: a
   // finished mesh whose journal is complete.
