@@ -23,8 +23,8 @@ import stellate.v1.CancelMeshRequest;
 import stellate.v1.CheckReport;
 import stellate.v1.CreateMeshRequest;
 import stellate.v1.DeleteMeshRequest;
-import stellate.v1.DoctorGrpc;
-import stellate.v1.GetCheckReportRequest;
+import stellate.v1.ExamineRequest;
+import stellate.v1.ExamineResponse;
 import stellate.v1.GetMeshRequest;
 import stellate.v1.GetServerInfoRequest;
 import stellate.v1.ListMeshesRequest;
@@ -228,15 +228,37 @@ public final class Client implements AutoCloseable {
     return call(outage(), now -> now.getServerInfo(GetServerInfoRequest.getDefaultInstance()));
   }
 
-  /** What the doctor found, if this is a connection to it. */
-  CheckReport checkReport(String name) {
-    GetCheckReportRequest request = GetCheckReportRequest.newBuilder().setName(name).build();
-    return call(
-        once(),
-        now ->
-            DoctorGrpc.newBlockingStub(now.getChannel())
-                .withDeadlineAfter(CALL_SECONDS, TimeUnit.SECONDS)
-                .getCheckReport(request));
+  /**
+   * Probes an oracle for its contract, before a mesh is made of its answers; what it throws is a
+   * finding, too. epsilon: that a mesh is planned with, 0: none yet.
+   */
+  public CheckReport check(Oracle oracle, double epsilon) {
+    MeshSpec spec = spec(new CheckedOracle(oracle), epsilon, new Options());
+    ExamineRequest request = ExamineRequest.newBuilder().setSpec(spec).build();
+    RuntimeException failure = null;
+    try {
+      Iterator<ExamineResponse> events = blocking.examine(request);
+      while (events.hasNext()) {
+        ExamineResponse event = events.next();
+        if (event.hasMesh()) {
+          failure = failureOf(() -> serve(oracle, event.getMesh().getName(), "", 0));
+        } else if (event.hasReport()) {
+          return event.getReport();
+        }
+      }
+    } catch (StatusRuntimeException error) {
+      throw failure == null ? StellateException.of(error) : failure; // there was no examination
+    }
+    throw StellateException.protocol("it ended an examination without a report");
+  }
+
+  private static RuntimeException failureOf(Runnable work) {
+    try {
+      work.run();
+      return null;
+    } catch (RuntimeException error) {
+      return error;
+    }
   }
 
   /**

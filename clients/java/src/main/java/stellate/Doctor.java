@@ -4,8 +4,8 @@ import stellate.v1.CheckReport;
 import stellate.v1.Failure;
 
 /**
- * Whether an oracle is what it should be, and how large epsilon may be. The program stellate asks
- * the questions, for clients in all languages alike.
+ * Whether an oracle is what it should be, and how large epsilon may be. A private server asks the
+ * questions, for clients in all languages alike; Client.check has another one ask.
  */
 public final class Doctor {
   private Doctor() {}
@@ -19,24 +19,9 @@ public final class Doctor {
    * report has.
    */
   public static CheckReport check(Oracle oracle, double epsilon) {
-    try (Server doctor = Server.startDoctor();
-        Client client = new Client(doctor)) {
-      String name = client.create(oracle, epsilon, new Options()).getName();
-      RuntimeException failure = serve(client, oracle, name);
-      try {
-        return client.checkReport(name);
-      } catch (StellateException error) {
-        throw failure == null ? error : failure; // there was no examination
-      }
-    }
-  }
-
-  private static RuntimeException serve(Client client, Oracle oracle, String name) {
-    try {
-      client.serve(oracle, name, "", 0);
-      return null;
-    } catch (RuntimeException error) {
-      return error;
+    try (Server server = Server.start();
+        Client client = new Client(server)) {
+      return client.check(oracle, epsilon);
     }
   }
 

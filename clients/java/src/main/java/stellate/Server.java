@@ -47,21 +47,6 @@ public final class Server implements AutoCloseable {
             + " the binary, or put it on PATH, or build it (clients/quickstart does)");
   }
 
-  /** The command-line program: beside the server binary, else on PATH. */
-  public static Path findStellate() {
-    List<Path> candidates = new ArrayList<>();
-    try {
-      candidates.add(findStellated().resolveSibling("stellate"));
-    } catch (StellateException none) {
-      candidates.clear(); // one that is on PATH without its server will do
-    }
-    onPath("stellate").forEach(candidates::add);
-    return firstProgram(
-        candidates,
-        "the program stellate, which examines oracles, is neither beside stellated nor on PATH:"
-            + " install it, or build it (clients/quickstart does)");
-  }
-
   private static Path firstProgram(List<Path> candidates, String noneIsThere) {
     return candidates.stream()
         .filter(path -> Files.isRegularFile(path) && Files.isExecutable(path))
@@ -91,20 +76,15 @@ public final class Server implements AutoCloseable {
       all.addAll(List.of("--keepalive", "600", "--keepalive-timeout", "600"));
     }
     all.addAll(List.of(flags));
-    return launch(List.of(findStellated().toString()), listen, all);
+    return launch(findStellated().toString(), listen, all);
   }
 
-  /** The doctor, to which an oracle is served as to a server: see Doctor. */
-  static Server startDoctor() {
-    return launch(List.of(findStellate().toString(), "doctor"), null, List.of());
-  }
-
-  private static Server launch(List<String> program, String listen, List<String> flags) {
+  private static Server launch(String program, String listen, List<String> flags) {
     try {
       Path folder = Files.createTempDirectory("stellate-");
       // A session of its own: Ctrl-C is for the client, which cancels its meshes first.
       List<String> command = new ArrayList<>(List.of("setsid"));
-      command.addAll(program);
+      command.add(program);
       command.addAll(List.of("--exit-with-parent", "--listen"));
       command.add(listen == null ? "unix:" + folder.resolve("socket") : listen);
       command.addAll(flags);
@@ -123,7 +103,7 @@ public final class Server implements AutoCloseable {
       }
       return server;
     } catch (IOException error) {
-      throw notFound("cannot start " + program.get(0) + ": " + error.getMessage(), error);
+      throw notFound("cannot start " + program + ": " + error.getMessage(), error);
     }
   }
 
