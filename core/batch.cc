@@ -10,6 +10,7 @@
 #include "core/base/message.h"
 #include "core/base/name_point.h"
 #include "core/label_table.h"
+#include "core/list_walls.h"
 #include "core/wall_beyond.h"
 
 namespace stellate::core {
@@ -203,7 +204,8 @@ std::string NameTangential(WallSet walls, const Eigen::MatrixXd& along) {
 // may meet as they like.
 bool IsOnM(const Specification& spec, WallSet face, const double* clearances) {
   if (spec.labels.empty()) return !WallBeyond(clearances, spec.walls, face);
-  return LabelTable(spec.labels).Piece(face, SignsOf(clearances, spec.walls)) != 0;
+  return LabelTable(spec.labels, Closures(spec.closures))
+             .Piece(face, SignsOf(clearances, spec.walls)) != 0;
 }
 
 // Checks that conormals are unit, tangent to the tangent basis of the same answer, and independent
@@ -241,8 +243,15 @@ Status CheckConormals(const Specification& spec, const QueryBlock& block, Index 
   });
   if (!status.ok() || count < 2 || !IsOnM(spec, block.face, answer.clearances.col(j).data()))
     return status;
+  // Of walls that depend on each other, only as many are independent as the face takes.
   const Eigen::MatrixXd gram = along.transpose() * along;
-  const double independent = EigenvaluesOfSymmetric(gram)[0];
+  const int dependent = count - Closures(spec.closures).Codimension(block.face);
+  const Eigen::VectorXd eigenvalues = EigenvaluesOfSymmetric(gram);
+  if (dependent > 0 && eigenvalues[dependent - 1] >= kLeastTransversality)
+    return refuse("the closures say that walls ", ListWalls(block.face),
+                  " vanish together, but at ", NamePoint(answer.points.col(j)),
+                  ", on all of them, their conormals are independent");
+  const double independent = eigenvalues[dependent];
   if (independent >= kLeastTransversality) return Status::Ok();
   return refuse("the walls meet nearly tangentially: ", NameTangential(block.face, along), ", at ",
                 NamePoint(answer.points.col(j)),

@@ -176,6 +176,8 @@ struct Certificate {
   std::int64_t boundary_euler_characteristic = 0;
   std::vector<FaceReport> faces;      // all faces, by dimension, the lowest first
   std::vector<RegionReport> regions;  // of an arrangement of walls, by label; else none
+  // Of an arrangement: the vertices at which M, or a region, touches itself in an edge or a point.
+  std::uint64_t pinched_vertices = 0;
   // The smallest angle of walls at all vertices on several walls; none: no walls meet. Set for
   // every ending of a run.
   std::optional<WallAngle> sharpest;

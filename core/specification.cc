@@ -7,6 +7,8 @@
 #include <string>
 
 #include "core/base/message.h"
+#include "core/label_table.h"
+#include "core/list_walls.h"
 
 namespace stellate::core {
 namespace {
@@ -63,10 +65,11 @@ Status CheckLabels(const Specification& spec) {
                                      spec.walls, " walls have ", std::size_t{1} << spec.walls,
                                      " sign vectors: give one for each"));
   const auto worst = std::min_element(spec.labels.begin(), spec.labels.end());
-  if (*worst < 0)
+  if (*worst < LabelTable::kImpossible)
     return Invalid("labels", Message("labels[", worst - spec.labels.begin(), "] is ", int{*worst},
-                                     " but must be 0, outside of the manifold, or more"));
-  if (std::all_of(spec.labels.begin(), spec.labels.end(), [](int label) { return label == 0; }))
+                                     " but must be 0, outside of the manifold, or more, or ",
+                                     LabelTable::kImpossible, " where no point has these signs"));
+  if (std::all_of(spec.labels.begin(), spec.labels.end(), [](int label) { return label <= 0; }))
     return Invalid("labels", "labels are all 0: they leave nothing of the manifold");
   if (spec.criteria.speculative)
     return Invalid("criteria.speculative",
@@ -75,9 +78,27 @@ Status CheckLabels(const Specification& spec) {
   return Status::Ok();
 }
 
+Status CheckClosures(const Specification& spec) {
+  if (spec.closures.size() > kMaxClosures)
+    return TooLarge("closures", Message("closures has ", spec.closures.size(),
+                                        " sets but may have at most ", kMaxClosures));
+  for (std::size_t i = 0; i < spec.closures.size(); ++i) {
+    const WallSet set = spec.closures[i];
+    if (!IsSubset(set, SetOfWall(spec.walls) - 1) || CountWalls(set) < 3)
+      return Invalid("closures",
+                     Message("closures[", i, "] is of walls ", ListWalls(set),
+                             " but must be of three walls or more, each below ", spec.walls,
+                             ": each has to be zero wherever all others of them are"));
+  }
+  return Status::Ok();
+}
+
 Status CheckWalls(const Specification& spec) {
   if (spec.walls == 0 && !spec.labels.empty())
     return Invalid("labels", "labels are set without walls, whose sign vectors they are of");
+  if (spec.labels.empty() && !spec.closures.empty())
+    return Invalid("closures",
+                   "closures are set without labels: they are of the walls of an arrangement");
   if (spec.walls == 0) return Status::Ok();
   if (spec.walls < 0 || spec.walls > kMaxWalls) {
     return Invalid("walls", Message("walls is ", spec.walls, " but must be between 0 and ",
@@ -88,8 +109,10 @@ Status CheckWalls(const Specification& spec) {
                    "walls is set: the oracle must give tangent bases and, with points of faces, "
                    "conormals, whose coordinates are in these bases");
   }
-  if (!spec.labels.empty())
+  if (!spec.labels.empty()) {
     if (Status status = CheckLabels(spec); !status.ok()) return status;
+    if (Status status = CheckClosures(spec); !status.ok()) return status;
+  }
   if (spec.declared_reach || spec.cover_box) {
     return Invalid("declared_reach",
                    "declared_reach is set together with walls, but only manifolds without boundary "

@@ -24,6 +24,7 @@ inline constexpr int kMaxCandidates = 100;
 inline constexpr int kMaxFlatAlternations = 20;
 inline constexpr int kMaxBoxSeeds = 100'000;
 inline constexpr int kMaxLabelledWalls = 16;
+inline constexpr std::size_t kMaxClosures = 1000;
 inline constexpr int kMaxComponents = 1'000'000;                   // that may be declared
 inline constexpr std::int64_t kMaxBoxSeedCoordinates = 4'000'000;  // box_seeds times d
 
@@ -109,9 +110,13 @@ struct Specification {
   int ambient_dimension = 0;  // d, k < d
   int walls = 0;              // of a manifold with boundary: see core/walls.h; k <= d then
   // An arrangement of walls: the label, 0 to 127, of each of the 2^walls sign vectors, in whose
-  // number bit i is set where g_i >= 0. M is where the label is not 0; its regions, one for each
-  // label, are meshed together. Empty: M is where all g_i >= 0.
+  // number bit i is set where g_i >= 0; -1 where no point has these signs. M is where the label is
+  // not 0; its regions, one for each label, are meshed together. Empty: M is where all g_i >= 0.
   std::vector<std::int8_t> labels;
+  // Of an arrangement whose walls depend on each other, as those of three phases that meet do: sets
+  // of three walls or more. Each wall of a set is zero wherever all others of it are. A face is
+  // then queried with all walls that are zero there.
+  std::vector<WallSet> closures;
   double epsilon = 0;  // rule R1: every R_p(sigma) <= epsilon; a length, > 0
   OracleCapabilities oracle;
   std::optional<BoundingBox> bounding_box;  // seeds are drawn from it when none are given

@@ -1,13 +1,18 @@
 #include "core/boundary/sharp_edges.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <numbers>
+#include <set>
+#include <utility>
+#include <vector>
 
 #include "core/base/instantiate.h"
 #include "core/base/interruption.h"
 #include "core/base/vector_ops.h"
-#include "core/boundary/corner_cone.h"
+#include "core/complex/corner_sectors.h"
+#include "core/geometry/corner_cone.h"
 
 namespace stellate::core {
 
@@ -36,12 +41,114 @@ double CosineBetween(const Sample<K>& sample, std::uint32_t p, int first, int se
   }
 }
 
+// A half of a wall that meets others in a face of codimension 2, seen across that: its wall, and
+// the direction in which it leaves the face, in the plane of two orthonormal axes.
+struct HalfWall {
+  int wall;
+  double along[2];
+};
+
+// Returns the live half-walls that meet in a face of codimension 2 at p. `signs`: of the other
+// walls.
+template <int K>
+std::vector<HalfWall> HalfWallsAround(const Sample<K>& sample, std::uint32_t p, WallSet face,
+                                      WallSet signs) {
+  const WallSet walls = sample.walls(p);
+  const auto conormal = [&](int wall) {
+    return sample.Conormals(p) + K * CountWalls(walls & (SetOfWall(wall) - 1));
+  };
+  // Two axes, the first along the first conormal, the second along what is off it of the steepest.
+  const double* const first = conormal(std::countr_zero(face));
+  double second[K] = {}, most2 = 0;
+  ForEachWall(face, [&](int wall) {
+    double off[K];
+    const double along = Dot(first, conormal(wall), K);
+    for (int a = 0; a < K; ++a) off[a] = conormal(wall)[a] - along * first[a];
+    if (const double norm2 = Dot(off, off, K); norm2 > most2) {
+      most2 = norm2;
+      for (int a = 0; a < K; ++a) second[a] = off[a] / std::sqrt(norm2);
+    }
+  });
+  const auto in_plane = [&](int wall, double* x) {
+    x[0] = Dot(first, conormal(wall), K);
+    x[1] = Dot(second, conormal(wall), K);
+    const double length = std::sqrt(x[0] * x[0] + x[1] * x[1]);
+    x[0] /= length;
+    x[1] /= length;
+  };
+  std::vector<HalfWall> live;
+  ForEachWall(face, [&](int wall) {
+    double normal[2];
+    in_plane(wall, normal);
+    for (const double sign : {1.0, -1.0}) {
+      const HalfWall half{wall, {-sign * normal[1], sign * normal[0]}};
+      WallSet there = signs & ~face;
+      ForEachWall(face, [&](int other) {
+        double outward[2];
+        in_plane(other, outward);
+        if (outward[0] * half.along[0] + outward[1] * half.along[1] < 0) there |= SetOfWall(other);
+      });
+      if (sample.sectors().labels().Piece(SetOfWall(wall), there) != 0) live.push_back(half);
+    }
+  });
+  return live;
+}
+
+// SharpestAt for a point of an arrangement where more walls meet than its face has dimensions less
+// than M: of all live half-walls around an edge, the two at the smallest angle.
+template <int K>
+std::optional<WallCosine> SharpestOfHalfWalls(const Sample<K>& sample, std::uint32_t p) {
+  const LabelTable& labels = sample.sectors().labels();
+  std::optional<WallCosine> sharpest;
+  std::set<std::pair<WallSet, WallSet>> seen;
+  const auto look = [&](WallSet face, WallSet signs) {
+    face = labels.Close(face);
+    signs &= ~face;
+    if (!seen.emplace(face, signs).second || labels.Piece(face, signs) == 0) return;
+    const std::vector<HalfWall> live = HalfWallsAround<K>(sample, p, face, signs);
+    for (std::size_t i = 0; i < live.size(); ++i)
+      for (std::size_t j = 0; j < i; ++j) {
+        const double cosine =
+            live[i].along[0] * live[j].along[0] + live[i].along[1] * live[j].along[1];
+        if (live[i].wall != live[j].wall && (!sharpest || cosine > sharpest->cosine))
+          sharpest = WallCosine{SetOfWall(live[i].wall) | SetOfWall(live[j].wall), cosine};
+      }
+  };
+  const int codimension = labels.Codimension(sample.walls(p));
+  if (codimension == 2 || K == 2) {
+    look(sample.walls(p), sample.sectors().Signs(p));
+    return sharpest;
+  }
+  const bool is_corner = codimension >= K;
+  for (int sector = 0; sector < sample.sectors().Count(p); ++sector) {
+    const Site site = sample.At(p, sector);
+    const WallSet signs = sample.sectors().SignsOf(p, sector);
+    // At a corner not every two walls of a sector share an edge of it.
+    const CornerCone<K> cone =
+        is_corner ? ConeOfSector<K>(site.walls, site.conormals, sample.sectors().At(p, sector))
+                  : CornerCone<K>();
+    ForEachWall(site.bounds, [&](int first) {
+      ForEachWall(site.bounds & ~((SetOfWall(first) << 1) - 1), [&](int second) {
+        const WallSet pair = SetOfWall(first) | SetOfWall(second);
+        const bool share =
+            !is_corner || std::any_of(cone.rays.begin(), cone.rays.end(),
+                                      [&](const auto& ray) { return IsSubset(pair, ray.walls); });
+        if (share) look(pair, signs);
+      });
+    });
+  }
+  return sharpest;
+}
+
 }  // namespace
 
 template <int K>
 std::optional<WallCosine> SharpestAt(const Stars<K>& stars, std::uint32_t p) {
   const WallSet walls = stars.sample().walls(p);
   if (CountWalls(walls) < 2) return std::nullopt;
+  if (!stars.sample().sectors().labels().empty() &&
+      CountWalls(walls) > std::min(K, stars.sample().Codimension(walls)))
+    return SharpestOfHalfWalls<K>(stars.sample(), p);
   std::optional<WallCosine> sharpest;
   const double* const conormals = stars.sample().Conormals(p);
   // If there are more than K walls, some meet only in the corner, and in no edge.

@@ -103,7 +103,7 @@ std::optional<NearCorners> NearestCorners(const Stars<K>& stars) {
   if (K == 1) return std::nullopt;
   std::vector<std::uint32_t> corners;
   for (const std::uint32_t p : stars.sample().boundary())
-    if (CountWalls(stars.sample().walls(p)) >= K) corners.push_back(p);
+    if (stars.sample().Codimension(stars.sample().walls(p)) >= K) corners.push_back(p);
   std::optional<NearCorners> nearest;
   for (std::size_t i = 0; i < corners.size(); ++i) {
     CheckInterruption(i);

@@ -2,6 +2,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <utility>
 #include <vector>
 
@@ -34,6 +35,9 @@ struct MeshView {
   const LabelTable* table = nullptr;
   const WallSet* signs = nullptr;
   const std::uint8_t* one_sided = nullptr;
+  // The signs of the sectors of vertices where more walls meet than k independent ones. Of all
+  // other vertices the walls and the table tell them.
+  const std::map<std::uint32_t, std::vector<WallSet>>* corner_sectors = nullptr;
   // The squared radii of protecting balls, by vertex (Sample::SetProtectingBalls); null: none.
   const double* protecting_radii2 = nullptr;
 

@@ -5,6 +5,7 @@
 
 #include "core/base/basis_layout.h"
 #include "core/base/capacity.h"
+#include "core/complex/corner_sectors.h"
 
 namespace stellate::core {
 
@@ -21,7 +22,10 @@ template <int K>
 std::uint32_t Sample<K>::Add(const double* point, const double* tangent, WallSet walls,
                              const double* conormals, WallSet signs) {
   const std::uint32_t id = size();
-  sectors_.Add(walls, signs);
+  if (const LabelTable& labels = sectors_.labels(); !labels.empty())
+    sectors_.Add(walls, signs,
+                 labels.Codimension(walls) > K ? CornerSectors<K>(labels, walls, conormals, signs)
+                                               : sectors_.Of(walls, signs));
   if (walls != 0) {
     walls_.resize(id, 0);
     walls_.push_back(walls);

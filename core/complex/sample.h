@@ -27,14 +27,16 @@ struct Site {
   const double* conormals = nullptr;
   // Of an arrangement of walls: the signs of all walls, those that the point is on aside.
   WallSet signs = 0;
-  // The walls that the star at hand is on the negative side of (Sectors): their conormals point
-  // into it.
+  // The walls that bound the star at hand, and those that it is on the negative side of (Sectors):
+  // their conormals point into it.
+  WallSet bounds = walls;
   WallSet reversed = 0;
 
   // Returns the same site for its star in a sector.
-  Site Towards(WallSet sector) const {
+  Site Towards(const Sector& sector) const {
     Site site = *this;
-    site.reversed = walls & ~sector;
+    site.bounds = sector.bounds;
+    site.reversed = walls & ~sector.signs;
     return site;
   }
 };
@@ -102,6 +104,8 @@ class Sample {
   std::uint32_t NameOf(std::uint32_t id) const { return id < names_.size() ? names_[id] : id; }
   // The walls that a point is on.
   WallSet walls(std::uint32_t id) const { return id < walls_.size() ? walls_[id] : 0; }
+  // How many of its walls a face takes (LabelTable).
+  int Codimension(WallSet face) const { return sectors_.labels().Codimension(face); }
   // K for each of its walls, ascending.
   const double* Conormals(std::uint32_t id) const {
     return id < walls_.size() ? conormals_.data() + conormals_at_[id] : nullptr;
@@ -109,7 +113,7 @@ class Sample {
   // `sector`: of the point's sectors; the site is of its star there.
   Site At(std::uint32_t id, int sector = 0) const {
     const Site site{id, Point(id), Tangent(id), walls(id), Conormals(id), sectors_.Signs(id)};
-    return sectors_.labels().empty() ? site : site.Towards(sectors_.SignsOf(id, sector));
+    return sectors_.labels().empty() ? site : site.Towards(sectors_.At(id, sector));
   }
   const Sectors& sectors() const { return sectors_; }
 
@@ -162,10 +166,9 @@ class Sample {
   // Writes the `count` points nearest to q as (squared distance, id), nearest first, and returns
   // how many there are.
   int Nearest(const double* q, int count, std::pair<double, std::uint32_t>* nearest) const;
-  // Points sorted by place are mostly near the one before them.
-  std::uint32_t PlaceOf(std::uint32_t id) const { return tree().PlaceOf(id); }
 
-  // A point's influence is how far from it a point may be that changes its star.
+  // A point's influence is how far from it a point may be that changes its star. Points sorted by
+  // their places in the tree are mostly near the one before them.
   const BallTree& tree() const { return points_.tree(); }
   BallTree& tree() { return points_.tree(); }
   // The points on walls, ascending, and their tree, by place in boundary(). In it the influence

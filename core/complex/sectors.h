@@ -9,6 +9,12 @@
 
 namespace stellate::core {
 
+// A side of the walls of a point.
+struct Sector {
+  WallSet signs = 0;   // of all walls, in it
+  WallSet bounds = 0;  // of the point's walls, those that bound it
+};
+
 // The sectors of the points of a sample. A point on walls of an arrangement has a sector on each
 // side of them that is in M, with a star of its own; any other point has one sector, all of its
 // tangent cone. Without labels every point has one, and nothing is stored.
@@ -18,14 +24,14 @@ class Sectors {
 
   const LabelTable& labels() const { return labels_; }
 
-  // Takes the next point, with the walls that it is on and the signs of all others.
-  void Add(WallSet walls, WallSet signs) {
+  // Takes the next point, with the walls that it is on and the signs of all others. `sectors`: of
+  // it.
+  void Add(WallSet walls, WallSet signs, const std::vector<Sector>& sectors) {
     if (labels_.empty()) return;
     const std::size_t id = signs_.size();
     signs_.push_back(signs);
     if (walls == 0) return;
     at_.resize(id + 1, sectors_.size());
-    const std::vector<WallSet> sectors = labels_.Sectors(walls, signs);
     sectors_.insert(sectors_.end(), sectors.begin(), sectors.end());
     at_.push_back(sectors_.size());
   }
@@ -36,19 +42,26 @@ class Sectors {
   }
   // Returns the signs of all walls at a point, those that it is on aside.
   WallSet Signs(std::uint32_t id) const { return labels_.empty() ? 0 : signs_[id]; }
-  // Returns the signs of all walls in a sector.
-  WallSet SignsOf(std::uint32_t id, int sector) const {
+  // REQUIRES: there are labels.
+  Sector At(std::uint32_t id, int sector) const {
     const std::size_t next = std::size_t{id} + 1;
     return next < at_.size() && at_[next] > at_[id]
                ? sectors_[at_[id] + static_cast<std::size_t>(sector)]
-               : Signs(id);
+               : Sector{Signs(id), 0};
   }
-  // Returns the same for each sector of a point that need not be in the sample. Without labels: all
-  // of its walls are positive.
-  std::vector<WallSet> Of(WallSet walls, WallSet signs) const {
-    return labels_.empty() ? std::vector<WallSet>{walls}
-           : walls == 0    ? std::vector<WallSet>{signs}
-                           : labels_.Sectors(walls, signs);
+  // Returns the signs of all walls in a sector.
+  WallSet SignsOf(std::uint32_t id, int sector) const {
+    return labels_.empty() ? 0 : At(id, sector).signs;
+  }
+  // Returns the sectors of a point that need not be in the sample, on walls all of whose possible
+  // signs occur there. Without labels: all of its walls are positive.
+  std::vector<Sector> Of(WallSet walls, WallSet signs) const {
+    if (labels_.empty()) return {{walls, walls}};
+    if (walls == 0) return {{signs, 0}};
+    std::vector<Sector> sectors;
+    for (const WallSet sector : labels_.Sectors(walls, signs))
+      sectors.push_back({sector, labels_.Bounds(walls, sector)});
+    return sectors;
   }
   // Identifies the piece of the face of `walls` in a sector, as LabelTable::Piece does; 1 without
   // labels.
@@ -65,7 +78,7 @@ class Sectors {
   std::vector<WallSet> signs_;  // by point
   // Where the sectors of each point begin, up to the last on a wall, and the end.
   std::vector<std::size_t> at_;
-  std::vector<WallSet> sectors_;
+  std::vector<Sector> sectors_;
 };
 
 }  // namespace stellate::core

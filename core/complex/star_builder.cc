@@ -155,9 +155,9 @@ template <int K>
 void StarBuilder<K>::Reset(const Site& p, Cell* star) const {
   const StarSurroundings<K> around(*this, p, options_.centre_rule);
   star->Reset(options_.inradius, around);
-  if (p.walls == 0) return;
+  if (p.bounds == 0) return;
   Step step(sample_.d());
-  ForEachWall(p.walls, [&](int wall) {
+  ForEachWall(p.bounds, [&](int wall) {
     double outward[K];
     const double offset = around.HalfSpace(IdOfWall(wall), outward);
     around.Lift(outward, step.data());

@@ -155,6 +155,8 @@ typename Stars<K>::FaceSimplex Stars<K>::FaceSimplexOf(std::uint32_t p, const Ce
     else
       simplex.ids[static_cast<std::size_t>(simplex.count++)] = id;
   }
+  simplex.codimension = CountWalls(simplex.walls);
+  simplex.walls = sample_.sectors().labels().Close(simplex.walls);
   const auto end = simplex.ids.begin() + simplex.count;
   std::sort(simplex.ids.begin(), end);
   simplex.foreign = std::any_of(simplex.ids.begin(), end, [&](std::uint32_t id) {
@@ -169,7 +171,7 @@ std::optional<typename Stars<K>::CellVertex> Stars<K>::EncroachedBy(const double
   const std::vector<std::uint32_t>& boundary = sample_.boundary();
   if (boundary.empty()) return std::nullopt;
   std::optional<CellVertex> worst;
-  const int own = K - CountWalls(walls);
+  const int own = K - sample_.Codimension(walls);
   int lowest = own;
   double farthest2 = 0;
   Step step(sample_.d());
@@ -270,7 +272,7 @@ void Stars<K>::TryPoint(const double* point, const double* tangent, std::uint32_
   const Site guest{size(), point, tangent, walls, conormals, signs};
   const StarBuilder<K> builder = this->builder();
   FindClosing(point, near, &closing);
-  const std::vector<WallSet> sectors = sample_.sectors().Of(walls, signs);
+  const std::vector<Sector> sectors = sample_.sectors().Of(walls, signs);
   result->own.resize(sectors.size());
   for (std::size_t i = 0; i < sectors.size(); ++i)
     builder.Build(guest.Towards(sectors[i]), closing, &result->own[i], &influenced);

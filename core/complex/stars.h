@@ -115,14 +115,15 @@ class Stars {
   }
   // The dual of vertex v of p's cell: a simplex of the face of its walls.
   struct FaceSimplex {
-    Simplex ids;        // the first `count`, ascending
-    int count = 0;      // its dimension, and one
-    WallSet walls = 0;  // of the vertex
-    bool fake = false;  // a facet is fake: it is no simplex yet
+    Simplex ids;          // the first `count`, ascending
+    int count = 0;        // its dimension, and one
+    WallSet walls = 0;    // of its face
+    int codimension = 0;  // of that
+    bool fake = false;    // a facet is fake: it is no simplex yet
     // A vertex of it is not on the face: a point off the face is nearer to the cell's vertex than
     // the face's own points.
     bool foreign = false;
-    int dimension() const { return K - CountWalls(walls); }
+    int dimension() const { return K - codimension; }
   };
   // `guest_walls`: the walls of the point with the id size(), if it has a facet.
   FaceSimplex FaceSimplexOf(std::uint32_t p, const Cell& cell, std::size_t v,

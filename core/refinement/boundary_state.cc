@@ -8,6 +8,8 @@ namespace {
 // As a share of a wall's largest clearance so far: a smaller one may be zero, which a query
 // decides.
 constexpr double kMaybeZero = 1e-6;
+// The same, of an arrangement: it may be meant to be zero.
+constexpr double kMaybeMeant = 1e-3;
 
 }  // namespace
 
@@ -25,7 +27,8 @@ bool BoundaryState<K>::KeepCrowd(const AnsweredPoints& answers, Eigen::Index c, 
   for (Eigen::Index i = 0; i < answers.clearances.rows(); ++i) {
     const WallSet wall = SetOfWall(static_cast<int>(i));
     if (IsSubset(wall, crowd.walls)) continue;
-    if (std::abs(answers.clearances(i, c)) <= kMaybeZero * largest_clearances_[i])
+    const double share = answers.labels.empty() ? kMaybeZero : kMaybeMeant;
+    if (std::abs(answers.clearances(i, c)) <= share * largest_clearances_[i])
       crowd.possible |= wall;
     if (answers.clearances(i, c) < 0) crowd.beyond |= wall;
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/base/instantiate.h"
+#include "core/closures.h"
 #include "core/refinement/candidate_set.h"
 #include "core/walls.h"
 
@@ -22,7 +23,8 @@ class BoundaryState {
   // Corners nearer to each other than this, in epsilon, are one.
   static constexpr double kSameCorner = 1e-6;
 
-  explicit BoundaryState(int walls) : has_walls_(walls > 0), stage_(walls > 0 ? 0 : K) {}
+  explicit BoundaryState(int walls, Closures closures = {})
+      : has_walls_(walls > 0), closures_(std::move(closures)), stage_(walls > 0 ? 0 : K) {}
 
   bool has_walls() const { return has_walls_; }
 
@@ -49,8 +51,8 @@ class BoundaryState {
 
   // Records a point of the face of `walls` that lies beyond another wall: the face of both is near.
   void Discover(Eigen::VectorXd point, WallSet walls, int beyond) {
-    if (beyond != kNoWall && CountWalls(walls) < K)
-      discoveries_.push_back({std::move(point), walls | SetOfWall(beyond), {}});
+    if (beyond != kNoWall && closures_.Codimension(walls) < K)
+      discoveries_.push_back({std::move(point), closures_.Close(walls | SetOfWall(beyond)), {}});
   }
   bool has_discoveries() const { return !discoveries_.empty(); }
   std::vector<Seed> TakeDiscoveries() { return std::exchange(discoveries_, {}); }
@@ -102,6 +104,7 @@ class BoundaryState {
 
  private:
   bool has_walls_;
+  Closures closures_;
   int stage_, left_ = 0;
   std::optional<std::size_t> most_while_split_;
   std::vector<Seed> seeds_, discoveries_;

@@ -28,7 +28,7 @@ std::vector<std::uint32_t> InOrderOfPlace(const Stars<K>& stars,
                                           const std::vector<std::uint32_t>& ids) {
   std::vector<std::pair<std::uint32_t, std::uint32_t>> places(ids.size());
   ParallelFor(ids.size(), [&](std::size_t i) {
-    places[i] = {stars.sample().PlaceOf(ids[i]), static_cast<std::uint32_t>(i)};
+    places[i] = {stars.sample().tree().PlaceOf(ids[i]), static_cast<std::uint32_t>(i)};
   });
   ParallelSort(places, std::less<>());
   std::vector<std::uint32_t> order;
@@ -49,9 +49,9 @@ Engine<K>::Engine(const Specification& spec, const ResolvedCriteria& criteria)
       random_seed_(spec.random_seed),
       max_vertices_(spec.limits.max_vertices),
       stars_(spec.ambient_dimension, criteria.epsilon, {criteria.inradius, criteria.centre_rule},
-             LabelTable(spec.labels)),
+             LabelTable(spec.labels, Closures(spec.closures))),
       sizes_(criteria),
-      boundary_(spec.walls) {
+      boundary_(spec.walls, Closures(spec.closures)) {
   // Sizes are estimated from whole stars.
   if (boundary_.has_walls() && !sizes_.is_estimated()) stars_.RestrictToBoundary();
 }

@@ -24,7 +24,7 @@ void TakeSeedsOfInactiveFaces(const Stars<K>& stars, int stage,
   std::erase_if(*seeds, [&](auto& seed) {
     const bool is_taken = std::any_of(taken->begin(), taken->end(),
                                       [&](const auto& other) { return other.walls == seed.walls; });
-    if (K - CountWalls(seed.walls) != stage || seed.walls == 0 || is_taken ||
+    if (K - stars.sample().Codimension(seed.walls) != stage || seed.walls == 0 || is_taken ||
         HasPointOn<K>(stars, seed.walls) || stars.EncroachedBy(seed.point.data(), seed.walls))
       return false;
     taken->push_back(std::move(seed));
@@ -39,7 +39,7 @@ PlannedPoints FaceSeeds<K>::Choose() {
   std::vector<typename BoundaryState<K>::Seed> chosen, left;
   for (auto& seed : engine_.boundary.seeds()) {
     CheckInterruption(chosen.size() + left.size());
-    const int dimension = K - CountWalls(seed.walls);
+    const int dimension = K - engine_.stars.sample().Codimension(seed.walls);
     const double apart = dimension == 0 ? BoundaryState<K>::kSameCorner * engine_.criteria.epsilon
                                         : engine_.criteria.epsilon;
     const bool covered = engine_.stars.sample().AnyWithin(seed.point.data(), apart) ||
@@ -96,8 +96,9 @@ PlannedPoints FaceSeeds<K>::TakeDiscoveries() {
     planned.points.col(column) = found[i].point;
     planned.walls.push_back(found[i].walls);
     planned.spacing[column] =
-        engine_.criteria.epsilon *
-        (CountWalls(found[i].walls) == K ? BoundaryState<K>::kSameCorner : kNewsAway);
+        engine_.criteria.epsilon * (engine_.stars.sample().Codimension(found[i].walls) == K
+                                        ? BoundaryState<K>::kSameCorner
+                                        : kNewsAway);
   }
   return planned;
 }

@@ -38,9 +38,10 @@ std::optional<Target<K>> FaceSplits<K>::Of(const typename Stars<K>::CellVertex& 
   const auto& cell = engine_.stars.cell(at.star, at.sector);
   Violation<K> violation =
       ViolationAt<K>(std::min(by, Rule::kRadiusEdge), cell, at.vertex, false, at.sector);
-  violation.walls = WallsAt<K>(cell, at.vertex);
-  violation.encroached = true;
   const auto simplex = engine_.stars.FaceSimplexOf(at.star, cell, at.vertex);
+  violation.walls = simplex.walls;
+  violation.codimension = simplex.codimension;
+  violation.encroached = true;
   if (IsOnShell(simplex)) return std::nullopt;
   if (violation.dimension() <= engine_.boundary.left()) return std::nullopt;
   // The middle of an edge between two protecting balls is in both.

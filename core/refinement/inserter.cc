@@ -211,7 +211,7 @@ void Inserter<K>::InsertPlanned() {
     if (to_.is_full()) break;
     const Eigen::Index c = candidates_.drawn() + i;
     if (!answers_.found[static_cast<std::size_t>(c)]) continue;
-    if (CountWalls(WallsOf(c)) == K &&
+    if (to_.stars.sample().Codimension(WallsOf(c)) == K &&
         to_.boundary.KeepCrowd(answers_, c, BoundaryState<K>::kSameCorner * to_.criteria.epsilon))
       continue;
     if (const auto beyond = answers_.Beyond(c)) {
@@ -221,7 +221,8 @@ void Inserter<K>::InsertPlanned() {
     if (!FitsFaces(c)) continue;
     if (const std::optional<int> next = answers_.NextWall(c); next && to_.boundary.stage() == 0)
       to_.boundary.Discover(answers_.points.col(c), WallsOf(c), *next);
-    if (K - CountWalls(WallsOf(c)) > to_.boundary.stage()) {  // corners and their shells come first
+    if (K - to_.stars.sample().Codimension(WallsOf(c)) >
+        to_.boundary.stage()) {  // corners and their shells come first
       to_.boundary.KeepSeed(answers_.points.col(c), WallsOf(c));
       continue;
     }

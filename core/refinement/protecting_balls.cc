@@ -34,7 +34,7 @@ bool IsSharp(const Stars<K>& stars, std::uint32_t p, double cosine) {
 
 template <int K>
 bool IsCorner(const Stars<K>& stars, std::uint32_t p) {
-  return CountWalls(stars.sample().walls(p)) >= K;
+  return stars.sample().Codimension(stars.sample().walls(p)) >= K;
 }
 
 // An edge of the mesh of edges, seen from one end.

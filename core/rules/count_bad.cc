@@ -42,7 +42,7 @@ class StarsWithGuest {
     const LabelTable& labels = stars_.sample().sectors().labels();
     if (labels.empty()) return 1;
     return labels.Piece(WallsAt<K>(cell, v), q == guest()
-                                                 ? sectors_[static_cast<std::size_t>(sector)]
+                                                 ? sectors_[static_cast<std::size_t>(sector)].signs
                                                  : stars_.sample().sectors().SignsOf(q, sector));
   }
   // Whether star(q) would lack a simplex that another star has. `fresh`: the guest is a vertex of
@@ -68,7 +68,7 @@ class StarsWithGuest {
 
   const Stars<K>& stars_;
   const typename Stars<K>::Tentative& tentative_;
-  std::vector<WallSet> sectors_;  // of the guest
+  std::vector<Sector> sectors_;  // of the guest
 };
 
 }  // namespace

@@ -28,6 +28,7 @@ class Worst {
       return;
     worst_ = ViolationAt<K>(rule, cell, v, simplex.fake, sector);
     worst_->walls = simplex.walls;
+    worst_->codimension = simplex.codimension;
   }
   const std::optional<Violation<K>>& worst() const { return worst_; }
 

@@ -26,10 +26,11 @@ struct Violation {
   bool fake = false;        // not a simplex yet: the cell is unbounded there
   bool tilted = false;      // R3: not a sliver, but tilted too far for a proof
   bool sharp = false;       // R3: not a sliver, but has a sharp dihedral angle
-  WallSet walls = 0;        // of the dual vertex: the simplex is one of their face
+  WallSet walls = 0;        // of the face that the simplex is one of
+  int codimension = 0;      // of that face
   bool encroached = false;  // breaks no rule, but a point off its face would come too near
 
-  int dimension() const { return K - CountWalls(walls); }
+  int dimension() const { return K - codimension; }
 };
 
 // Returns the violation by the simplex dual to vertex v of p's cell.

@@ -48,6 +48,7 @@ MeshView WithSimplices(MeshView mesh, const std::vector<std::uint32_t>& simplice
     mesh.labels = boundary->labels.data();
     mesh.signs = boundary->signs.data();
     mesh.one_sided = boundary->one_sided.data();
+    mesh.corner_sectors = &boundary->corner_sectors;
   }
   if (!boundary->balls.empty()) mesh.protecting_radii2 = boundary->balls.data();
   return mesh;
@@ -112,6 +113,9 @@ BoundaryOfMesh BoundaryOf(const Engine<K>& engine) {
     for (std::uint32_t p = 0; p < stars.size(); ++p) {
       boundary.signs.push_back(stars.sample().sectors().Signs(p));
       boundary.one_sided.push_back(stars.sample().sectors().Count(p) == 1);
+      if (stars.sample().Codimension(stars.sample().walls(p)) <= K) continue;
+      for (int sector = 0; sector < stars.sample().sectors().Count(p); ++sector)
+        boundary.corner_sectors[p].push_back(stars.sample().sectors().SignsOf(p, sector));
     }
   }
   boundary.faces = FacesOf<K>(engine.stars());

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <vector>
 
@@ -22,6 +23,7 @@ struct BoundaryOfMesh {
   std::vector<std::int8_t> labels;  // of arrangements: by simplex; and by vertex, as of MeshView
   std::vector<WallSet> signs;
   std::vector<std::uint8_t> one_sided;
+  std::map<std::uint32_t, std::vector<WallSet>> corner_sectors;
   const LabelTable* table = nullptr;  // borrowed
   std::vector<FaceMesh> faces;
   std::vector<double> balls;  // squared radii of protecting balls, by vertex; empty: none

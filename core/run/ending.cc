@@ -10,13 +10,14 @@
 #include "core/base/instantiate.h"
 #include "core/base/interruption.h"
 #include "core/base/message.h"
-#include "core/boundary/corner_cone.h"
 #include "core/boundary/sharp_edges.h"
 #include "core/boundary/wall_bends.h"
 #include "core/certificate/evidence/evidence.h"
 #include "core/certificate/findings.h"
 #include "core/complex/consistency.h"
+#include "core/geometry/corner_cone.h"
 #include "core/geometry/reach_bound.h"
+#include "core/list_walls.h"
 #include "core/refinement/face_splits.h"
 
 namespace stellate::core {
@@ -30,13 +31,6 @@ constexpr double kLikelyError = 1e-3;
 constexpr double kNearlyMeet = 0.25;
 // In radii of a wall's curvature: no mesh with such an epsilon is certified, or likely to end.
 constexpr double kMuchTooCoarse = 2;
-
-// Writes "0, 2, 5".
-std::string ListWalls(WallSet walls) {
-  std::string names;
-  ForEachWall(walls, [&](int wall) { names += Message(names.empty() ? "" : ", ", wall); });
-  return names;
-}
 
 }  // namespace
 
@@ -192,14 +186,20 @@ void ExplainNearCorners(const Engine<K>& engine, double epsilon, Certificate* ce
       "; move one of these walls, so that it passes farther away, or take a smaller epsilon.");
 }
 
-std::string WhyTooCrowded(const CrowdedCorner& corner, int k, bool has_labels) {
+std::string WhyTooCrowded(const CrowdedCorner& corner, int k) {
   const WallSet walls = corner.walls;
-  std::string why = Message("walls ", ListWalls(walls), " meet in one point at ",
-                            NamePoint(corner.point), ", where ");
-  if (has_labels)
-    why += Message("labels differ across all of them: more than ", k,
-                   " walls in a point cannot be meshed with labels");
-  else if (corner.along != 0)
+  std::string why =
+      Message("walls ", ListWalls(walls), " meet in one point at ", NamePoint(corner.point));
+  if (corner.beside != 0)
+    return why + Message(", or nearly so: of walls ", ListWalls(corner.beside),
+                         " each passes beside it, nearer than a thousandth of epsilon; move them, "
+                         "so that they pass through it, or farther away from it");
+  why += ", where ";
+  if (corner.is_impossible)
+    return why +
+           "some direction has signs of theirs that the labels call impossible: correct the "
+           "labels, or the walls";
+  if (corner.along != 0)
     why += Message("more than ", k - 1, " of them meet along one edge of the manifold (walls ",
                    ListWalls(corner.along), "), or touch it");
   else if (CountWalls(walls) > kMostAtCorner)

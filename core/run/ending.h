@@ -52,7 +52,7 @@ template <int K>
 void ExplainNearCorners(const Engine<K>& engine, double epsilon, Certificate* certificate);
 
 // Explains why a corner of more than k walls cannot be meshed. has_labels: of an arrangement.
-std::string WhyTooCrowded(const CrowdedCorner& corner, int k, bool has_labels);
+std::string WhyTooCrowded(const CrowdedCorner& corner, int k);
 
 // Says what still breaks a rule, for people. inconsistent: simplices that DescribeUnfinished
 // counted.

@@ -72,6 +72,7 @@ void RoundTrip<K>::AskForAll() {
   if (planned.size() == 0) return;
   std::vector<WallSet> faces = planned.walls;
   faces.resize(static_cast<std::size_t>(planned.size()), 0);
+  for (WallSet& face : faces) face = engine_.stars().sample().sectors().labels().Close(face);
   const std::map<WallSet, int> block_of = OpenBlocks(faces);
   std::vector<Eigen::Index> next(open_.size(), 0);
   for (Eigen::Index i = 0; i < planned.size(); ++i) {
@@ -228,7 +229,9 @@ void RoundTrip<K>::SortFaces(const std::vector<AnswerBlock>& answers) {
   answers_.labels = engine_.stars().sample().sectors().labels();
   if (!answers_.labels.empty()) answers_.signs.assign(static_cast<std::size_t>(count), 0);
   answers_.clearances.resize(walls_, count);
-  answers_.conormals.resize(K * K, count);
+  int most = K;  // walls of a face
+  for (const WallSet face : asked_faces_) most = std::max(most, CountWalls(face));
+  answers_.conormals.resize(Eigen::Index{K} * most, count);
   for (Eigen::Index c = 0; c < count; ++c) {
     const auto i = static_cast<std::size_t>(c);
     CheckInterruption(i);

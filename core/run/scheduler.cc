@@ -37,7 +37,7 @@ Scheduler<K>::Scheduler(const Specification& spec, const Interruption& interrupt
       repeat_check_(spec_.epsilon),
       wall_check_(K, spec_.ambient_dimension, spec_.epsilon),
       spare_points_(spec_.ambient_dimension),
-      watches_{{spec_.bounding_box, engine_.criteria().epsilon}, StallWatch(K), {}} {
+      watches_{{spec_.bounding_box, engine_.criteria().epsilon}, StallWatch(K), {}, {}} {
   if (spec_.walls > 0)
     AskForFaces(SeedsOf(spec_));
   else
@@ -104,6 +104,8 @@ void Scheduler<K>::AskFor(Eigen::MatrixXd&& points, Purpose purpose) {
 template <int K>
 void Scheduler<K>::AfterTrip() {
   const auto* const answered = trip_.get();
+  if (Status status = watches_.table.Judge(trip_->answers(), K); !status.ok())
+    return Fail(std::move(status));
   spare_points_.KeepClearances(trip_->answers(), ClearPointsKept(engine_.stars().size()));
   TakeTrip();
   if (outcome_ || trip_.get() != answered || AskForSample()) return;  // it has more queries

@@ -18,6 +18,7 @@
 #include "core/run/repeat_check.h"
 #include "core/run/round_trip.h"
 #include "core/run/spare_points.h"
+#include "core/run/table_check.h"
 #include "core/run/tangent_finder.h"
 #include "core/run/wall_check.h"
 #include "core/run/watches.h"
@@ -135,6 +136,7 @@ class Scheduler final : public QuerySource {
     BoxWatch box;
     StallWatch stall;
     BoundaryDetector boundary;
+    TableCheck table;
   } watches_;
   struct {
     bool speculation_failed = false;   // the last round of candidates inserted nothing

@@ -153,7 +153,7 @@ bool Scheduler<K>::PlanFaces(std::optional<std::vector<Target<K>>>* targets) {
 template <int K>
 void Scheduler<K>::SettleCrowds() {
   const std::optional<CrowdedCorner> bad = Corners<K>(engine_.parts()).Settle(trip_->answers());
-  if (bad) Fail({StatusCode::kOracleBadConormal, WhyTooCrowded(*bad, K, !spec_.labels.empty())});
+  if (bad) Fail({StatusCode::kOracleBadConormal, WhyTooCrowded(*bad, K)});
 }
 
 // Call it when rounds no longer help: leaves the faces of this stage as they are, for the sake of

@@ -89,6 +89,7 @@ void BoundaryToProto(const core::Certificate& c, v1::Certificate* out) {
     one->set_components(region.components);
     one->set_euler_characteristic(region.euler_characteristic);
   }
+  out->set_pinched_vertices(c.pinched_vertices);
   if (!c.sharpest) return;
   add_walls(c.sharpest->walls, out->mutable_sharpest());
   out->mutable_sharpest()->set_degrees(c.sharpest->degrees);

@@ -227,6 +227,19 @@ Refused ReadTimeouts(const v1::MeshLimits& limits, const Config& config, OracleT
   return Status::Ok();
 }
 
+Refused ReadClosures(const v1::MeshSpec& spec, core::Specification* to) {
+  for (const v1::Closure& closure : spec.closures()) {
+    core::WallSet& walls = to->closures.emplace_back(0);
+    for (const std::uint32_t wall : closure.walls()) {
+      if (wall >= core::kMaxWalls)
+        return Invalid("closures", Message("closures names wall ", wall, ", but there are ",
+                                           spec.walls(), " walls"));
+      walls |= core::SetOfWall(static_cast<int>(wall));
+    }
+  }
+  return Status::Ok();
+}
+
 }  // namespace
 
 Allowed<MeshRequest> ReadSpec(const v1::MeshSpec& spec, const Config& config) {
@@ -241,6 +254,7 @@ Allowed<MeshRequest> ReadSpec(const v1::MeshSpec& spec, const Config& config) {
   request.about = spec.oracle().about();
   Refused status = ToInt(spec.walls(), "walls", &request.spec.walls);
   request.spec.labels.assign(spec.labels().begin(), spec.labels().end());
+  if (status.ok()) status = ReadClosures(spec, &request.spec);
   if (status.ok()) status = ReadDimensions(spec, config, &request.spec);
   if (status.ok()) status = ReadPlace(spec, &request.spec);
   if (status.ok()) status = ReadAudit(spec, &request.spec);
@@ -275,6 +289,11 @@ void ToProto(const core::Specification& spec, v1::MeshSpec* out) {
   out->mutable_oracle()->set_conormals(spec.oracle.conormals);
   out->set_walls(static_cast<std::uint32_t>(spec.walls));
   out->set_labels(std::string(spec.labels.begin(), spec.labels.end()));
+  for (const core::WallSet closure : spec.closures) {
+    v1::Closure* const walls = out->add_closures();
+    core::ForEachWall(closure,
+                      [&](int wall) { walls->add_walls(static_cast<std::uint32_t>(wall)); });
+  }
   if (spec.bounding_box) {
     const auto d = static_cast<std::size_t>(spec.bounding_box->lower.size());
     v1::BoundingBox* const box = out->mutable_bounding_box();

@@ -52,6 +52,7 @@ void LayOutSpecification(Archive& archive, Value& spec) {
   archive.Number(spec.threads);
   archive.Number(spec.walls);
   archive.Bytes(spec.labels);
+  archive.Ids(spec.closures);
   archive.Number(spec.oracle.conormals);
 }
 

@@ -64,7 +64,8 @@ class RecordWriter {
   void Bytes(const std::string& bytes) { Array(bytes.data(), bytes.size()); }
   void Bytes(const std::vector<std::uint8_t>& bytes) { Array(bytes.data(), bytes.size()); }
   void Bytes(const std::vector<std::int8_t>& bytes) { Array(bytes.data(), bytes.size()); }
-  void Ids(const std::vector<std::uint32_t>& ids) {
+  template <typename Id>
+  void Ids(const std::vector<Id>& ids) {
     Array(ids.data(), ids.size() * sizeof(ids[0]));
   }
   void Strings(const std::vector<std::string>& strings) {
@@ -124,7 +125,8 @@ class RecordReader {
     const std::string_view data = Array();
     bytes.assign(data.begin(), data.end());
   }
-  void Ids(std::vector<std::uint32_t>& ids) {
+  template <typename Id>
+  void Ids(std::vector<Id>& ids) {
     const std::string_view data = Array();
     good_ = good_ && data.size() % sizeof(ids[0]) == 0;
     ids.resize(good_ ? data.size() / sizeof(ids[0]) : 0);

@@ -101,6 +101,7 @@ void LayOutBoundary(Archive& archive, Value& certificate) {
     archive.Number(region.components);
     archive.Number(region.euler_characteristic);
   }
+  archive.Number(certificate.pinched_vertices);
 }
 
 template <typename Archive, typename Value>

@@ -66,6 +66,48 @@ TEST(LabelTable, AnotherPieceBeginsAtAWallBetween) {
   EXPECT_EQ(three.Between(1, 6, 0, std::vector{0., .1, .3}.data()), 2);
 }
 
+// Three phases: walls f0 - f1, f0 - f2, f1 - f2.
+LabelTable Phases() {
+  // By f0 > f1, f0 > f2, f1 > f2 as bits: 0 is 2 > 1 > 0, and 2 > 0 > 1 with f1 > f2 is impossible.
+  return LabelTable({3, 3, -1, 1, 2, -1, 2, 1}, Closures({0b111}));
+}
+
+TEST(Closures, OfDependentWallsAFaceTakesFewer) {
+  const Closures three({0b111});
+  EXPECT_EQ(three.Close(0b011), 0b111u);
+  EXPECT_EQ(three.Close(0b101), 0b111u);
+  EXPECT_EQ(three.Close(0b010), 0b010u);
+  EXPECT_EQ(three.Close(0b1001), 0b1001u);
+  EXPECT_EQ(three.Codimension(0b111), 2);
+  EXPECT_EQ(three.Codimension(0b1111), 3);
+  EXPECT_EQ(Closures().Codimension(0b111), 3);
+  // Four phases, walls 01, 02, 03, 12, 13, 23: three of them that connect all imply the rest.
+  const Closures four({0b001011, 0b010101, 0b100110, 0b111000});
+  EXPECT_EQ(four.Close(0b000111), 0b111111u);
+  EXPECT_EQ(four.Close(0b100001), 0b100001u) << "f0 = f1 and f2 = f3";
+  EXPECT_EQ(four.Codimension(0b111111), 3);
+}
+
+TEST(LabelTable, WherePhasesMeetThereIsASectorForEachOrder) {
+  const LabelTable phases = Phases();
+  EXPECT_EQ(phases.Sectors(0b111, 0).size(), 6u);
+  for (const WallSet order : phases.Sectors(0b111, 0))
+    EXPECT_EQ(CountWalls(phases.Bounds(0b111, order)), 2) << order;
+  EXPECT_EQ(phases.Bounds(0b111, 0b111), 0b101u) << "f0 > f1 > f2: not f0 - f2";
+  EXPECT_EQ(phases.Active(0b011, 0), 0b111u);
+  EXPECT_NE(phases.Piece(0b011, 0), 0u);
+  EXPECT_EQ(phases.Piece(0b011, 0), phases.Piece(0b111, 0));
+  EXPECT_EQ(phases.Piece(0b001, 0b000), 0u) << "f2 is above f0 = f1";
+  EXPECT_NE(phases.Piece(0b001, 0b110), 0u) << "f2 is below";
+  EXPECT_EQ(phases.Piece(0, 0b111), phases.Piece(0, 0b011)) << "the two orders of phase 1";
+  EXPECT_EQ(phases.Piece(0, 0b010), 0u) << "impossible";
+  EXPECT_TRUE(phases.IsPossible(0b010, 0b001));
+  EXPECT_FALSE(phases.IsPossible(0b010, 0));
+  // Beside f0 = f1 < f2 the wall is live where f2 is below: f0 - f2 and f1 - f2 change together.
+  const double clearances[] = {0, -0.2, -0.2};
+  EXPECT_EQ(phases.Beside(0b001, 0b000, clearances), 1);
+}
+
 TEST(LabelTable, AClearanceOfZeroCountsAsPositive) {
   const double clearances[] = {-1, 0, 2, -0.0};
   EXPECT_EQ(SignsOf(clearances, 4), 0b1110u);

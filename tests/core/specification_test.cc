@@ -128,10 +128,10 @@ TEST(Validate, NamesTheFieldAndTheValueOfWhatItRefuses) {
          SetWalls(2, &s);
          s.labels = {0, 1, 1};
        }},
-      {"labels[1] is -1 ",
+      {"labels[1] is -2 ",
        [](auto& s) {
          SetWalls(1, &s);
-         s.labels = {0, -1};
+         s.labels = {0, -2};
        }},
       {"labels are all 0",
        [](auto& s) {
@@ -142,6 +142,24 @@ TEST(Validate, NamesTheFieldAndTheValueOfWhatItRefuses) {
        [](auto& s) {
          SetWalls(17, &s);
          s.labels.assign(std::size_t{1} << 17, 1);
+       },
+       StatusCode::kLimitExceeded},
+      {"closures are set without labels",
+       [](auto& s) {
+         SetWalls(3, &s);
+         s.closures = {7};
+       }},
+      {"closures[1] is of walls 0, 3 but must be of three walls or more, each below 3",
+       [](auto& s) {
+         SetWalls(3, &s);
+         s.labels.assign(8, 1);
+         s.closures = {7, 9};
+       }},
+      {"closures has 1001 sets but may have at most 1000",
+       [](auto& s) {
+         SetWalls(3, &s);
+         s.labels.assign(8, 1);
+         s.closures.assign(1001, 7);
        },
        StatusCode::kLimitExceeded},
       {"criteria.speculative is set together with labels",

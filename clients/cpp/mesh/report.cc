@@ -171,6 +171,7 @@ std::string CertificateJson(const Certificate& c) {
   json.Raw("faces", FacesJson(c.faces));
   json.Raw("sharpest", SharpestJson(c.sharpest));
   json.Raw("regions", RegionsJson(c.regions));
+  json.Add("pinched_vertices", c.pinched_vertices);
   json.Add("only_too_coarse", c.only_too_coarse);
   return json.Take();
 }

@@ -301,6 +301,7 @@ Report ReportOf(const v1::Mesh& mesh) {
   for (const v1::RegionCertificate& region : c.regions())
     out.regions.push_back(
         {region.label(), region.simplices(), region.components(), region.euler_characteristic()});
+  out.pinched_vertices = c.pinched_vertices();
   out.only_too_coarse = c.only_too_coarse();
   return r;
 }

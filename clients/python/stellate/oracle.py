@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import operator
 import os
 import threading
 from collections.abc import Iterator
@@ -43,11 +44,14 @@ class Oracle(Protocol):
       clearances(points (n, d)) -> (n, walls): the g_i, of which the sign counts.
       conormals(points (n, d), face) -> (n, len(face), d): at points of a face, the outward unit normal
         of each of its walls within the tangent space. stellate.oracles.Clipped has all of these.
-      labels: (2^walls,) whole numbers from 0 to 127, for walls of which M is not all that is positive:
+      labels: (2^walls,) whole numbers from -1 to 127, for walls of which M is not all that is positive:
         unions, differences, several materials. Entry s is the label of the points where wall i is
         positive if bit i of s is set, and else negative. M is where the label is not 0; its regions,
-        one for each label, are meshed together, and mesh.labels says which simplex is in which. At
-        most 16 walls may have labels.
+        one for each label, are meshed together, and mesh.labels says which simplex is in which. -1
+        stands where no point has such signs. At most 16 walls may have labels.
+      closures: sets of walls with labels, of numbers, for walls that depend on each other: each of a
+        set, of three or more, is zero wherever all others of it are, as f - g, g - h and f - h are.
+        A face is then asked for with all walls that are zero on it, although some follow from others.
       jacobian(points (n, d)) -> (n, m, d): of the equations that M is given by, if it is. Only
         stellate.check asks, to find where they lose rank.
       bounding_box: (lower (d,), upper (d,)), where to look for M, or
@@ -83,6 +87,7 @@ class CheckedOracle:
         self.has_jacobian = callable(getattr(oracle, "jacobian", None))
         self.walls = self._count_walls(oracle)
         self.labels = _labels(getattr(oracle, "labels", None), self.walls)
+        self.closures = _closures(getattr(oracle, "closures", ()))
         self.about = _sentence(getattr(oracle, "about", ""))
         self.bounding_box = _box(getattr(oracle, "bounding_box", None))
         seeds = getattr(oracle, "seeds", None)
@@ -299,9 +304,21 @@ def _labels(labels: Any, walls: int) -> bytes:
             f"labels has the shape {given.shape}, and {walls} walls have {1 << walls} vectors of signs: "
             "give one for each, in an array of one axis"
         )
-    if given.dtype.kind not in "iub" or given.min() < 0 or given.max() > 127:
-        raise InvalidArgument("labels have to be whole numbers from 0, outside of M, to 127")
+    if given.dtype.kind not in "iub" or given.min() < -1 or given.max() > 127:
+        raise InvalidArgument(
+            "labels have to be whole numbers from 0, outside of M, to 127, or -1 where no point is"
+        )
     return given.astype(np.int8).tobytes()
+
+
+def _closures(closures: Any) -> tuple[tuple[int, ...], ...]:
+    try:
+        sets = tuple(tuple(operator.index(wall) for wall in closure) for closure in closures or ())
+    except TypeError:
+        sets = ((-1,),)
+    if any(not 0 <= wall < 64 for walls in sets for wall in walls):
+        raise InvalidArgument("closures have to be sets of walls, each a sequence of their numbers")
+    return sets
 
 
 def _whole_number(oracle: Any, name: str) -> int:

@@ -197,6 +197,7 @@ class Certificate:
     faces: tuple[FaceCertificate, ...] = ()  # by dimension, the lowest first
     sharpest: WallAngle | None = None  # where walls meet at the smallest angle, if any meet
     regions: tuple[RegionCertificate, ...] = ()  # of an arrangement of walls, by label
+    pinched_vertices: int = 0  # where a region touches itself in an edge or a point alone
     only_too_coarse: bool = False  # refused for its size alone: nothing seen contradicts it
 
 

@@ -43,6 +43,9 @@ class Parts {
 std::size_t PartsAt(const MeshView& mesh, std::uint32_t v, int label) {
   if (CountWalls(mesh.WallsOf(v)) < 2) return 1;
   std::vector<WallSet> sectors = mesh.table->Sectors(mesh.WallsOf(v), mesh.signs[v]);
+  if (mesh.corner_sectors)
+    if (const auto at = mesh.corner_sectors->find(v); at != mesh.corner_sectors->end())
+      sectors = at->second;
   if (label != 0)
     std::erase_if(sectors, [&](WallSet sector) { return mesh.table->Of(sector) != label; });
   Parts parts(sectors.size());

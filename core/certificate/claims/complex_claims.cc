@@ -169,6 +169,7 @@ void JudgeTopology(Examination& x, const ClosedOff* closed, const Topology& topo
   c.violations.links.resize(std::min(c.violations.links.size(), Violations::kMost));
   c.euler_characteristic = links.euler_characteristic;
   if (closed) BoundaryClaims(x).JudgeFaces(*closed);
+  if (closed) x.pinched.insert(closed->copied.begin(), closed->copied.end());
   if (closed && !closed->wrong_parts.empty())
     x.findings.Refuse(Findings::kLinks, closed->wrong_parts);
   RefuseWhatIsNoManifold(x, topology);

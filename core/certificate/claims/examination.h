@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "core/batch.h"
@@ -56,7 +57,8 @@ struct Examination {
   double position_error = 0;         // of the oracle, as seen at the vertices
   std::vector<double> seen;          // points of M that were answered, d each
   std::vector<double> wanted;  // points of M that the mesh should have a vertex nearer to, d each
-  PointsOnWalls wanted_on_walls;  // where the mesh should end
+  PointsOnWalls wanted_on_walls;    // where the mesh should end
+  std::set<std::uint32_t> pinched;  // vertices, as of Certificate::pinched_vertices
 };
 
 // Whether the answer to query j was found.

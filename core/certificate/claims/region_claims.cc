@@ -3,7 +3,9 @@
 #include <map>
 #include <string>
 
+#include "core/base/interruption.h"
 #include "core/base/message.h"
+#include "core/base/name_point.h"
 #include "core/certificate/claims/closed_off.h"
 #include "core/certificate/complex/links.h"
 
@@ -30,6 +32,13 @@ void RegionClaims::Judge() {
     region.insert(region.end(), ids, ids + width);
   }
   for (const auto& [label, simplices] : regions) JudgeRegion(label, simplices);
+  x_.certificate.pinched_vertices = x_.pinched.size();
+  if (x_.pinched.empty()) return;
+  const std::uint32_t first = *x_.pinched.begin();
+  x_.findings.Warn(Message(
+      "Pinched at ", x_.pinched.size(), x_.pinched.size() == 1 ? " vertex" : " vertices",
+      ", the first at ", NamePoint(x_.Vertex(first)),
+      ": the manifold, or a region of it, touches itself there in an edge or a point alone."));
 }
 
 void RegionClaims::JudgeRegion(int label, const std::vector<std::uint32_t>& simplices) {
@@ -38,6 +47,7 @@ void RegionClaims::JudgeRegion(int label, const std::vector<std::uint32_t>& simp
   const ClosedOff closed_off = CloseOff(x_.mesh, simplices, label, [&](const FaceMesh& face) {
     return (face.sides.first == label) != (face.sides.second == label);
   });
+  x_.pinched.insert(closed_off.copied.begin(), closed_off.copied.end());
   const Adjacency closed(closed_off.list(k), closed_off.apex);
   const LinkReport links = CheckLinks(closed, closed_off.apex);
   RegionReport report;
@@ -74,6 +84,14 @@ void RegionClaims::JudgeInside(const std::vector<std::uint32_t>& chosen, std::ui
       if (!Found(answer, j)) continue;
       const WallSet signs = SignsOf(answer.clearances.col(j).data(), x_.spec.walls);
       if (MayBeIn(*x_.mesh.table, label, signs, touched)) continue;
+      if (!x_.mesh.table->IsPossible(signs, touched)) {
+        x_.findings.Refuse(
+            Findings::kCoverage,
+            Message("the labels say that no point has the signs of the walls that ",
+                    NamePoint(answer.points.col(j)), " has, inside of simplex ",
+                    NameSimplex(ids, x_.mesh.k + 1), ": correct the labels, or the walls"));
+        continue;
+      }
       x_.findings.Refuse(
           Findings::kCoverage,
           Message("simplex ", NameSimplex(ids, x_.mesh.k + 1), " has the label ", +label,

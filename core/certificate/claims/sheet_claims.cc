@@ -332,7 +332,9 @@ std::optional<std::pair<int, int>> SheetClaims::SidesOf(int wall, const double* 
     return WallBeyond(clearances, x_.spec.walls, face) ? std::nullopt
                                                        : std::optional(std::pair(0, 1));
   const auto sides = x_.mesh.table->Sides(face, SignsOf(clearances, x_.spec.walls));
-  return sides.first == sides.second ? std::nullopt : std::optional(sides);
+  const bool is_live =
+      sides.first != sides.second && std::min(sides.first, sides.second) != LabelTable::kImpossible;
+  return is_live ? std::optional(sides) : std::nullopt;
 }
 
 void SheetClaims::Judge(std::size_t wall, const Eigen::MatrixXd&, const AnswerBlock& answer) {

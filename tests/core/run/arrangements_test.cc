@@ -26,6 +26,13 @@ struct LabelledMesh {
   std::map<int, Complex> regions;
 };
 
+// Why a mesh was not certified; empty if it was.
+std::string WhyNot(const Expected<LabelledMesh>& mesh) {
+  if (!mesh) return mesh.error().message;
+  const Certificate& certificate = mesh->report.certificate;
+  return certificate.certified ? "" : certificate.verdict;
+}
+
 using Change = std::function<void(const QueryBlock&, AnswerBlock*)>;
 
 // `change`, if given, makes the answers wrong.
@@ -94,6 +101,7 @@ std::map<int, double> VolumesByCounting(const Arrangement& a) {
     if (i == at.size()) break;
   }
   volumes.erase(0);
+  EXPECT_EQ(volumes.count(-1), 0u) << "signs that are called impossible";
   return volumes;
 }
 
@@ -164,6 +172,89 @@ TEST_P(ArrangementsTest, HaveTheLabelsOfTheirPlaces) {
   for (const auto& [label, volume] : VolumesByCounting(arrangement))
     EXPECT_NEAR(Volume(*mesh, mesh->regions.at(label)), volume, 0.12 * volume)
         << label;  // chords of what is round
+}
+
+// Where a region touches itself alone, in the plane in two points and in space along a circle.
+TEST(Arrangements, PinchedRegionsAreMeshedAndCalledSo) {
+  for (const int d : {2, 3}) {
+    const Arrangement pinched = testing::Pinched(d);
+    const auto mesh = MeshOf(pinched.domain, pinched.SpecificationFor(0.3));
+    ASSERT_TRUE(mesh) << mesh.error().message;
+    const Certificate& certificate = mesh->report.certificate;
+    EXPECT_TRUE(certificate.certified) << certificate.verdict;
+    std::uint64_t on_both = 0;
+    for (Eigen::Index v = 0; v < mesh->points.cols(); ++v)
+      on_both += std::abs(pinched.domain.walls[0](mesh->points.col(v), nullptr)) < 1e-9 &&
+                 std::abs(pinched.domain.walls[1](mesh->points.col(v), nullptr)) < 1e-9;
+    EXPECT_EQ(certificate.pinched_vertices, on_both);
+    EXPECT_GE(on_both, 2u);
+    ASSERT_FALSE(certificate.warnings.empty());
+    EXPECT_NE(certificate.warnings.front().find("Pinched at "), std::string::npos);
+    EXPECT_EQ(testing::EulerOf(mesh->regions.at(1)), d == 2 ? 0 : 2);
+  }
+}
+
+// Closures that do not hold, and tables that call impossible what there is, are refuted by name.
+TEST(Arrangements, WrongClosuresAreRefuted) {
+  const Arrangement three = testing::PhaseArrangements()[0];
+  Specification spec = three.SpecificationFor(0.3);
+  Domain apart = three.domain;  // wall 1 passes beside where walls 0 and 2 meet
+  apart.walls[1] = [f = apart.walls[1]](const Eigen::VectorXd& x, Eigen::VectorXd* gradient) {
+    return f(x, gradient) + 0.15;
+  };
+  const std::string beside = WhyNot(MeshOf(apart, spec));
+  EXPECT_NE(beside.find("closures say that walls 0, 1, 2 vanish together, but at ("),
+            std::string::npos)
+      << beside;
+
+  const Arrangement cube = testing::SpaceArrangements()[6];  // walls 0, 2, 4 are independent
+  spec = cube.SpecificationFor(0.3);
+  spec.closures = {SetOfWall(0) | SetOfWall(2) | SetOfWall(4)};
+  Domain domain = cube.domain;
+  domain.closures = Closures(spec.closures);
+  const std::string independent = WhyNot(MeshOf(domain, spec));
+  EXPECT_NE(independent.find("closures say that walls 0, 2, 4 vanish together"), std::string::npos)
+      << independent;
+
+  const Arrangement venn = testing::PlaneArrangements()[2];
+  spec = venn.SpecificationFor(0.3);
+  spec.labels[3] = -1;
+  const std::string impossible = WhyNot(MeshOf(venn.domain, spec));
+  EXPECT_NE(impossible.find("labels say that no point has the signs ++"), std::string::npos)
+      << impossible;
+}
+
+TEST(Arrangements, PhasesWithWrongSignsOrLabelsAreNotCertified) {
+  const Arrangement three = testing::PhaseArrangements()[0];
+  const auto flip = [](const QueryBlock&, AnswerBlock* answer) { answer->clearances.row(1) *= -1; };
+  const auto flip_on_walls = [&](const QueryBlock& asked, AnswerBlock* answer) {
+    if (asked.face != 0) flip(asked, answer);
+  };
+  Specification spec = three.SpecificationFor(0.3);
+  spec.limits.max_rounds = 300;
+  for (const Change& change : {Change(flip), Change(flip_on_walls)}) {
+    const auto mesh = MeshOf(three.domain, spec, change);
+    EXPECT_FALSE(mesh && mesh->report.certificate.certified);
+  }
+  // Labels of half of the orders permuted: in the table one phase is two.
+  for (std::size_t signs = 0; signs < spec.labels.size(); ++signs)
+    if (spec.labels[signs] == 1 && (signs & 4) != 0) spec.labels[signs] = 2;
+  const auto mesh = MeshOf(three.domain, spec);
+  if (!mesh) return;
+  EXPECT_TRUE(!mesh->report.certificate.certified ||
+              mesh->report.certificate.regions.size() == 3);  // it is what the table says
+}
+
+// A wall that passes beside a corner, and too near to tell whether it is meant to be in it.
+TEST(Arrangements, WallsThatNearlyMeetInACornerAreNamed) {
+  Arrangement pyramid = testing::CrowdedArrangements()[1];
+  const auto side = pyramid.domain.walls[0];
+  pyramid.domain.walls[0] = [side](const Eigen::VectorXd& x, Eigen::VectorXd* gradient) {
+    return side(x, gradient) - 2e-5;
+  };
+  const std::string why = WhyNot(MeshOf(pyramid.domain, pyramid.SpecificationFor(0.2)));
+  EXPECT_NE(why.find("walls 0, 1, 2, 3 meet in one point at ("), std::string::npos) << why;
+  EXPECT_NE(why.find("or nearly so"), std::string::npos) << why;
 }
 
 // Whatever is wrong with the signs, nothing is certified, or refused as if it were right.
@@ -270,6 +361,14 @@ std::string NameOf(const ::testing::TestParamInfo<std::tuple<Arrangement, unsign
 }
 INSTANTIATE_TEST_SUITE_P(OfThePlane, ArrangementsTest,
                          ::testing::Combine(::testing::ValuesIn(testing::PlaneArrangements()),
+                                            ::testing::Values(0u, 1u)),
+                         NameOf);
+INSTANTIATE_TEST_SUITE_P(OfPhases, ArrangementsTest,
+                         ::testing::Combine(::testing::ValuesIn(testing::PhaseArrangements()),
+                                            ::testing::Values(0u, 1u, 2u)),
+                         NameOf);
+INSTANTIATE_TEST_SUITE_P(OfCrowdedCorners, ArrangementsTest,
+                         ::testing::Combine(::testing::ValuesIn(testing::CrowdedArrangements()),
                                             ::testing::Values(0u, 1u)),
                          NameOf);
 INSTANTIATE_TEST_SUITE_P(OfSpace, ArrangementsTest,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -59,6 +60,161 @@ inline Arrangement OfBalls(int d, std::string name, std::function<int(core::Wall
   a.label = std::move(label);
   a.euler = std::move(euler);
   return a;
+}
+
+// Phases: at each point that one of which the function is the largest, cut by further walls, all of
+// which are positive inside. Wall by wall i < j: f_i - f_j; label i + 1.
+inline Arrangement PhasesOf(int k, std::vector<Domain::Function> functions,
+                            std::vector<Domain::Function> cuts) {
+  const auto n = static_cast<int>(functions.size());
+  Arrangement a;
+  std::vector<std::vector<int>> wall(functions.size(), std::vector<int>(functions.size()));
+  for (int i = 0; i < n; ++i)
+    for (int j = i + 1; j < n; ++j) {
+      wall[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)] =
+          static_cast<int>(a.domain.walls.size());
+      a.domain.walls.push_back(
+          [f = functions[static_cast<std::size_t>(i)], g = functions[static_cast<std::size_t>(j)]](
+              const Eigen::VectorXd& x, Eigen::VectorXd* gradient) {
+            Eigen::VectorXd other(x.size());
+            const double value = f(x, gradient) - g(x, gradient ? &other : nullptr);
+            if (gradient) *gradient -= other;
+            return value;
+          });
+    }
+  std::vector<core::WallSet> sets;
+  const auto set = [wall](int i, int j) {
+    return core::SetOfWall(wall[static_cast<std::size_t>(i)][static_cast<std::size_t>(j)]);
+  };
+  for (int i = 0; i < n; ++i)
+    for (int j = i + 1; j < n; ++j)
+      for (int h = j + 1; h < n; ++h) sets.push_back(set(i, j) | set(i, h) | set(j, h));
+  a.domain.closures = core::Closures(std::move(sets));
+  const auto pairs = static_cast<int>(a.domain.walls.size());
+  for (auto& cut : cuts) a.domain.walls.push_back(std::move(cut));
+  const auto all = static_cast<int>(a.domain.walls.size());
+  a.domain.k = k;
+  // An order of the phases beats each other differently often: 0 to n - 1 times.
+  a.label = [=](core::WallSet signs) {
+    std::vector<int> beats(static_cast<std::size_t>(n));
+    for (int i = 0; i < n; ++i)
+      for (int j = i + 1; j < n; ++j)
+        ++beats[static_cast<std::size_t>(core::IsSubset(set(i, j), signs) ? i : j)];
+    std::vector<int> sorted = beats;
+    std::sort(sorted.begin(), sorted.end());
+    for (int i = 0; i < n; ++i)
+      if (sorted[static_cast<std::size_t>(i)] != i) return -1;
+    if (!AllOf(signs, pairs, all)) return 0;
+    return static_cast<int>(std::find(beats.begin(), beats.end(), n - 1) - beats.begin()) + 1;
+  };
+  for (int i = 1; i <= n; ++i) a.euler[i] = 1;
+  return a;
+}
+
+// -|x - centre|^2 / 2, bent a little: the walls between two such are no planes.
+inline Domain::Function NearTo(Eigen::VectorXd centre, double bend) {
+  return [=](const Eigen::VectorXd& x, Eigen::VectorXd* gradient) {
+    const Eigen::VectorXd off = x - centre;
+    if (gradient) {
+      *gradient = -off;
+      (*gradient)[0] -= bend * std::sin(2 * x[0]);
+    }
+    return -off.squaredNorm() / 2 + bend / 2 * std::cos(2 * x[0]);
+  };
+}
+
+// Three phases that meet in an edge, or four that meet in a point, in the unit ball of R^d.
+inline std::vector<Arrangement> PhaseArrangements() {
+  std::vector<Arrangement> all;
+  for (const int d : {2, 3}) {
+    std::vector<Domain::Function> functions;
+    for (int i = 0; i < 3; ++i) {
+      Eigen::VectorXd centre = Eigen::VectorXd::Zero(d);
+      centre[0] = std::cos(2.1 * i + 0.2) + 0.05 * i;
+      centre[1] = std::sin(2.1 * i + 0.2);
+      functions.push_back(NearTo(centre, i == 1 ? 0.25 : 0));
+    }
+    all.push_back(PhasesOf(d, functions, {InBall(Eigen::VectorXd::Zero(d), 1)}));
+    all.back().name = "Three";
+  }
+  std::vector<Domain::Function> four;
+  for (const Eigen::Vector3d& centre : {Eigen::Vector3d(1, 1, 1.1), Eigen::Vector3d(1, -1, -1),
+                                        Eigen::Vector3d(-1, 1, -0.9), Eigen::Vector3d(-1, -1.1, 1)})
+    four.push_back(NearTo(centre, four.size() == 1 ? 0.25 : 0));
+  all.push_back(PhasesOf(3, four, {InBall(Eigen::Vector3d::Zero(), 1)}));
+  all.back().name = "Four";
+  for (Arrangement& a : all) {
+    a.domain.d = a.domain.k;
+    a.domain.box = CubeOf(a.domain.d, 1.2);
+    a.name += "PhasesInDimension" + std::to_string(a.domain.k);
+  }
+  return all;
+}
+
+// sin x cos y + sin y cos z + sin z cos x, turned with the box that it is in.
+inline Domain::Function GyroidOf() {
+  return [](const Eigen::VectorXd& x, Eigen::VectorXd* gradient) {
+    const Eigen::Array3d s = x.array().sin(), c = x.array().cos();
+    if (gradient)
+      *gradient = Eigen::Vector3d(c[0] * c[1] - s[2] * s[0], c[1] * c[2] - s[0] * s[1],
+                                  c[2] * c[0] - s[1] * s[2]);
+    return s[0] * c[1] + s[1] * c[2] + s[2] * c[0];
+  };
+}
+
+// More walls than three pass through some corners.
+inline std::vector<Arrangement> CrowdedArrangements() {
+  std::vector<Arrangement> all;
+  {
+    Arrangement a;
+    a.name = "OctahedronWithGrain";
+    for (int i = 0; i < 8; ++i)
+      a.domain.walls.push_back(HalfSpaceOf(
+          Eigen::Vector3d((i & 1) != 0 ? 1 : -1, (i & 2) != 0 ? 1 : -1, (i & 4) != 0 ? 1 : -1) /
+              std::sqrt(3.0),
+          1 / std::sqrt(3.0)));
+    a.domain.walls.push_back(InBall(Eigen::Vector3d(0.05, 0, 0.02), 0.3));
+    a.domain.box = CubeOf(3, 1.1);
+    a.label = [](auto s) { return !AllOf(s, 0, 8) ? 0 : AllOf(s, 8, 9) ? 2 : 1; };
+    a.euler = {{1, 2}, {2, 1}};
+    a.epsilon = 0.12;
+    all.push_back(a);
+  }
+  {
+    Arrangement a;
+    a.name = "PyramidWithGrain";
+    for (const Eigen::Vector2d& side : {Eigen::Vector2d(-1, 0), Eigen::Vector2d(1, 0),
+                                        Eigen::Vector2d(0, -1), Eigen::Vector2d(0, 1)})
+      a.domain.walls.push_back(
+          HalfSpaceOf(Eigen::Vector3d(side[0], side[1], -0.6).normalized(), 0.7));
+    a.domain.walls.push_back(HalfSpaceOf(Eigen::Vector3d(0.1, 0, 1).normalized(), 0.5));
+    a.domain.walls.push_back(InBall(Eigen::Vector3d(0, 0, 0.1), 0.4));
+    a.domain.box = CubeOf(3, 1.9);
+    a.label = [](auto s) { return !AllOf(s, 0, 5) ? 0 : AllOf(s, 5, 6) ? 2 : 1; };
+    a.euler = {{1, 2}, {2, 1}};
+    a.epsilon = 0.2;
+    all.push_back(a);
+  }
+  {
+    // The gyroid passes through all corners of its cell: it cuts some, touches others, and in some
+    // M is on one side of it alone.
+    Arrangement a;
+    a.name = "AlignedGyroid";
+    a.domain.walls = {GyroidOf()};
+    const double half = std::acos(-1.0);
+    for (const auto& side : InBox(3, half)) a.domain.walls.push_back(side);
+    a.domain.box = CubeOf(3, half + 0.1);
+    a.label = [](auto s) { return !AllOf(s, 1, 7) ? 0 : AllOf(s, 0, 1) ? 1 : 2; };
+    a.epsilon = 0.3;
+    all.push_back(a);
+  }
+  for (Arrangement& a : all) a.domain.k = a.domain.d = 3;
+  return all;
+}
+
+// Two balls without what they have in common: the rest touches itself along a circle.
+inline Arrangement Pinched(int d) {
+  return OfBalls(d, "Pinched", [](auto s) { return s == 1 || s == 2 ? 1 : 0; }, {});
 }
 
 inline std::vector<Arrangement> PlaneArrangements() {

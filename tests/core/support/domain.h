@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/closures.h"
 #include "core/mesher.h"
 #include "stellate/implicit.h"
 
@@ -26,6 +27,7 @@ class Domain {
   int k = 0, d = 0;
   std::vector<Function> equations;  // d - k
   std::vector<Function> walls;
+  core::Closures closures;  // of walls that depend on each other
   BoundingBox box;
   std::vector<int> homology;  // ranks over Z/2, by dimension
   std::vector<int> boundary_homology;
@@ -62,6 +64,7 @@ class Domain {
     spec.ambient_dimension = d;
     spec.epsilon = epsilon;
     spec.walls = static_cast<int>(walls.size());
+    spec.closures = closures.sets();
     spec.oracle.tangent_basis = true;
     spec.oracle.conormals = !walls.empty();
     spec.bounding_box = core::BoundingBox{box.lower, box.upper};
@@ -82,7 +85,7 @@ class Domain {
     answer.found.assign(static_cast<std::size_t>(n), 1);
     if (static_cast<int>(face.size()) + d - k > 0) {
       Answer there = block.kind == core::QueryKind::kClosestPoint
-                         ? Solver(block.face).ClosestPoint(block.points)
+                         ? Solver(Independent(block.face)).ClosestPoint(block.points)
                          : Solver(0).IntersectFlat(block.points, block.bases, block.radii);
       answer.points = there.points;
       if (!there.found.empty()) answer.found = there.found;
@@ -125,6 +128,15 @@ class Domain {
   }
 
  private:
+  // Walls of a face on which all others of it are zero, too.
+  core::WallSet Independent(core::WallSet face) const {
+    core::WallSet chosen = 0;
+    core::ForEachWall(face, [&](int wall) {
+      if (!core::IsSubset(core::SetOfWall(wall), closures.Close(chosen)))
+        chosen |= core::SetOfWall(wall);
+    });
+    return chosen;
+  }
   static std::vector<int> WallsOf(core::WallSet set) {
     std::vector<int> walls;
     core::ForEachWall(set, [&](int wall) { walls.push_back(wall); });

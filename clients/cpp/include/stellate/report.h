@@ -142,6 +142,7 @@ struct Certificate {
   std::vector<FaceCertificate> faces;      // by dimension, the lowest first
   std::optional<WallAngle> sharpest;       // where walls meet at the smallest angle, if any meet
   std::vector<RegionCertificate> regions;  // of an arrangement of walls, by label
+  std::uint64_t pinched_vertices = 0;      // where a region touches itself in an edge or a point
 
   // Refused for epsilon alone: no check contradicts the mesh, which is too coarse, compared with
   // the reach, to be certified.

@@ -50,6 +50,8 @@ def mesh_spec(oracle: CheckedOracle, epsilon: float, options: Mapping[str, Any])
     spec.oracle.about = oracle.about
     _set(spec, "walls", oracle.walls)
     spec.labels = oracle.labels
+    for closure in oracle.closures:
+        spec.closures.add(walls=closure)
     if oracle.bounding_box is not None:
         lower, upper = oracle.bounding_box
         spec.bounding_box.lower.CopyFrom(to_wire(lower))

@@ -62,6 +62,8 @@ class Clipped:
       seeds: (s, d) points near what is left, where M's box or seeds are not to be gone by.
       labels: (2^walls,): the part of M with labels other than 0 instead of what is positive, region by
         region; see Oracle.labels. Walls have to cross at an angle only where labels differ.
+      closures: of walls with labels: sets of their numbers, each of three or more walls that are zero
+        wherever all others of the set are, as f - g, g - h and f - h; see Oracle.closures.
     """
 
     def __init__(
@@ -74,10 +76,12 @@ class Clipped:
         ball: Sequence[Any] | None = None,
         seeds: Any = None,
         labels: Any = None,
+        closures: Sequence[Sequence[int]] = (),
     ) -> None:
         self._walls: list[UserFunction] = []
         self._gradients: list[UserFunction | None] = []
         self.labels = None if labels is None else np.array(labels)
+        self.closures = tuple(tuple(map(int, closure)) for closure in closures)
         if isinstance(oracle, Clipped):
             if oracle.labels is not None:
                 raise InvalidArgument(
@@ -129,7 +133,8 @@ class Clipped:
         """(n, d) -> (n, d): nearest points of M where the walls of `face` are zero."""
         solver = self._faces.get(face)
         if solver is None:
-            walls, slopes = partial(self._values, face), partial(self._slopes, face)
+            enough = self._independent(face)
+            walls, slopes = partial(self._values, enough), partial(self._slopes, enough)
             solver = self._faces[face] = _Face(self._oracle, walls, slopes)
         return solver.closest_point(points)
 
@@ -146,6 +151,19 @@ class Clipped:
             steep = norms(along)[:, None]
             outward[:, i] = apply(bases, -along / np.where(steep > 0, steep, 1.0))
         return outward
+
+    def _independent(self, face: tuple[int, ...]) -> tuple[int, ...]:
+        """Walls of a face from which all others of it follow, by the closures."""
+        chosen: list[int] = []
+        zero: set[int] = set()
+        for wall in face:
+            if wall in zero:
+                continue
+            chosen.append(wall)
+            zero.add(wall)
+            while grown := {w for s in self.closures if len(set(s) - zero) == 1 for w in s} - zero:
+                zero |= grown
+        return tuple(chosen)
 
     def _values(self, face: tuple[int, ...], points: Array) -> Array:
         """(n, d) -> (n, len(face))"""
@@ -263,7 +281,7 @@ class Solid(Clipped):
     Args:
       walls: a function (n, d) -> (n,), or several.
       bounding_box: (lower (d,), upper (d,)) around it; by default that of a finite box or a ball.
-      gradients, box, ball, seeds, labels: as in Clipped.
+      gradients, box, ball, seeds, labels, closures: as in Clipped.
     """
 
     def __init__(
@@ -276,6 +294,7 @@ class Solid(Clipped):
         ball: Sequence[Any] | None = None,
         seeds: Any = None,
         labels: Any = None,
+        closures: Sequence[Sequence[int]] = (),
     ) -> None:
         several = [walls] if callable(walls) else walls
         slopes = [gradients] if callable(gradients) else gradients
@@ -289,6 +308,7 @@ class Solid(Clipped):
             ball=ball,
             seeds=seeds,
             labels=labels,
+            closures=closures,
         )
         self.thread_safe = False
 

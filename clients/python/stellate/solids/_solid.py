@@ -30,7 +30,49 @@ from ._walls import Opposite, Plane, Wall
 _MARGIN = 0.15  # of a solid's sides, around it
 
 
-class Solid:
+class ByWalls:
+    """The methods of an oracle that is another, of walls in space: its `_oracle`."""
+
+    @property
+    def _oracle(self) -> WalledSolid:
+        raise NotImplementedError
+
+    @property
+    def walls(self) -> int:
+        return self._oracle.walls
+
+    @property
+    def labels(self) -> Labels | None:
+        """Of the vectors of the walls' signs; None where it is all that is positive."""
+        return self._oracle.labels
+
+    @property
+    def closures(self) -> tuple[tuple[int, ...], ...]:
+        """Of walls that depend on each other."""
+        return self._oracle.closures
+
+    def closest_point(self, points: Array) -> Array:
+        """(n, d) -> (n, d): the points themselves, as of all of space."""
+        return self._oracle.closest_point(points)
+
+    def tangent_basis(self, points: Array) -> Array:
+        """(n, d) -> (n, d, d)."""
+        return self._oracle.tangent_basis(points)
+
+    def face_point(self, points: Array, face: tuple[int, ...]) -> Array:
+        """(n, d) -> (n, d): nearest points where the walls of `face` are zero."""
+        return self._oracle.face_point(points, face)
+
+    def clearances(self, points: Array) -> Array:
+        """(n, d) -> (n, walls): the walls' values."""
+        return self._oracle.clearances(points)
+
+    def conormals(self, points: Array, face: tuple[int, ...]) -> Array:
+        """(n, d) -> (n, len(face), d): outward unit normals of the walls."""
+        return self._oracle.conormals(points, face)
+
+
+class Solid(ByWalls):
     """A solid of R^d: walls, and a Boolean of their signs. It is an oracle, which stellate.mesh takes.
 
         part = (Box([-1] * 3, [1] * 3) & Ball(1.3)) - Cylinder(axis="x", radius=0.5)
@@ -190,36 +232,11 @@ class Solid:
         # Signs that no point has count as outside, of which nothing is seen.
         return WalledSolid(walls, self.bounding_box, labels=np.maximum(labels, 0))
 
-    @property
-    def walls(self) -> int:
-        return self._oracle.walls
-
-    @property
-    def labels(self) -> Labels | None:
-        """Of the vectors of the walls' signs; None where the solid is all that is positive."""
-        return self._oracle.labels
-
-    def closest_point(self, points: Array) -> Array:
-        """(n, d) -> (n, d): the points themselves, as of all of space."""
-        return self._oracle.closest_point(points)
-
-    def tangent_basis(self, points: Array) -> Array:
-        """(n, d) -> (n, d, d)."""
-        return self._oracle.tangent_basis(points)
-
-    def face_point(self, points: Array, face: tuple[int, ...]) -> Array:
-        """(n, d) -> (n, d): nearest points where the half-walls of `face` are zero."""
-        return self._oracle.face_point(points, face)
-
     def clearances(self, points: Array) -> Array:
         """(n, d) -> (n, walls): the half-walls' values."""
         for witness in self._witnesses:
             witness.insist(points)
         return self._oracle.clearances(points)
-
-    def conormals(self, points: Array, face: tuple[int, ...]) -> Array:
-        """(n, d) -> (n, len(face), d): outward unit normals of the half-walls."""
-        return self._oracle.conormals(points, face)
 
     def __repr__(self) -> str:
         return f"<stellate.solids.Solid of R^{self.dimension}: {len(Arrangement(self._tree).walls)} walls>"

@@ -1,4 +1,4 @@
-#include "core/boundary/corner_cone.h"
+#include "core/geometry/corner_cone.h"
 
 #include <gtest/gtest.h>
 

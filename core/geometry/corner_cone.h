@@ -20,9 +20,9 @@ struct CornerCone {
   };
   std::vector<Ray> rays;  // none: M is only the corner there
   WallSet walls = 0;      // the walls that have a facet of it
-  // Whether it has an interior, and K - 1 walls meet along each ray.
-  bool is_simple = false;
-  WallSet crowded = 0;  // if not simple: more than K - 1 walls that meet along one ray; or none
+  bool has_interior = false;
+  bool is_simple = false;  // it has an interior, and K - 1 walls meet along each ray
+  WallSet crowded = 0;     // if not simple: more than K - 1 walls that meet along one ray; or none
 };
 
 // Returns the cone. `conormals`: K numbers for each of the walls, ascending, outward and unit.

@@ -1,4 +1,4 @@
-#include "core/boundary/corner_cone.h"
+#include "core/geometry/corner_cone.h"
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -60,8 +60,8 @@ CornerCone<K> ConeOf(WallSet walls, const double* conormals) {
     cone.walls |= ray.walls;
     if (CountWalls(ray.walls) > K - 1) cone.crowded |= ray.walls;
   }
-  cone.is_simple = !cone.rays.empty() && cone.crowded == 0 &&
-                   (normals.transpose() * middle).maxCoeff() < -kAlongFace;
+  cone.has_interior = !cone.rays.empty() && (normals.transpose() * middle).maxCoeff() < -kAlongFace;
+  cone.is_simple = cone.has_interior && cone.crowded == 0;
   return cone;
 }
 

@@ -1,0 +1,17 @@
+#pragma once
+
+#include <string>
+
+#include "core/base/message.h"
+#include "core/walls.h"
+
+namespace stellate::core {
+
+// Writes "0, 2, 5".
+inline std::string ListWalls(WallSet walls) {
+  std::string names;
+  ForEachWall(walls, [&](int wall) { names += Message(names.empty() ? "" : ", ", wall); });
+  return names;
+}
+
+}  // namespace stellate::core
