@@ -56,7 +56,6 @@ impl Default for ClientOptions {
 /// A connection to a server; any thread may use it, but not from within an async runtime.
 pub struct Client {
     address: String,
-    pub(crate) channel: Channel,
     pub(crate) stub: Stub,
     pub(crate) runtime: Arc<Runtime>,
     pub(crate) patience: Patience,
@@ -109,7 +108,7 @@ impl Client {
             endpoint.connect_lazy()
         };
         let token = Token::new(options.credentials.token.as_deref())?;
-        let stub = StellateClient::with_interceptor(channel.clone(), token)
+        let stub = StellateClient::with_interceptor(channel, token)
             .max_decoding_message_size(LARGEST_MESSAGE)
             .max_encoding_message_size(LARGEST_MESSAGE);
         let process = own.map(Server::process);
@@ -119,7 +118,7 @@ impl Client {
             on_outage: options.on_outage,
             reached: AtomicBool::new(false),
         };
-        Ok(Client { address: address.to_string(), channel, stub, runtime: Arc::new(runtime), patience })
+        Ok(Client { address: address.to_string(), stub, runtime: Arc::new(runtime), patience })
     }
 
     pub(crate) fn outage(&self) -> Outage<'_> {

@@ -48,7 +48,7 @@ pub use mesh::{check_save, Mesh};
 pub use options::{Cancel, Connection, Growth, OnProgress, RunOptions};
 pub use oracle::{BoxError, Capabilities, Oracle};
 pub use progress::progress_bar;
-pub use server::{find_stellate, find_stellated, Server, ServerOptions};
+pub use server::{find_stellated, Server, ServerOptions};
 pub use session::{download, mesh, serve, watch, watch_by_name};
 pub use spec::MeshOptions;
 pub use worker::WorkerOptions;

@@ -73,17 +73,6 @@ pub fn find_stellated() -> Result<PathBuf, Error> {
     })
 }
 
-/// The command-line program: beside the server binary, else on PATH.
-pub fn find_stellate() -> Result<PathBuf, Error> {
-    let beside = find_stellated().ok().map(|server| server.with_file_name("stellate"));
-    let path = beside.filter(|path| runs(path)).or_else(|| on_path(Path::new("stellate")));
-    path.ok_or_else(|| {
-        let message = "the program stellate, which examines oracles, is neither beside stellated nor on \
-                       PATH: install it, or build it (clients/quickstart does)";
-        Error::new(Kind::ServerNotFound, "SERVER_NOT_FOUND", message)
-    })
-}
-
 impl Server {
     /// Starts it, and returns when it listens.
     pub fn start(options: &ServerOptions) -> Result<Self, Error> {
@@ -94,20 +83,10 @@ impl Server {
             flags.extend(["--keepalive", "600", "--keepalive-timeout", "600"].map(String::from));
         }
         flags.extend(options.flags.iter().cloned());
-        Server::launch(&binary, &[], &flags, options.listen.clone())
+        Server::launch(&binary, &flags, options.listen.clone())
     }
 
-    /// The doctor, to which an oracle is served as to a server: see `check`.
-    pub(crate) fn start_doctor() -> Result<Self, Error> {
-        Server::launch(&find_stellate()?, &["doctor"], &[], None)
-    }
-
-    fn launch(
-        binary: &Path,
-        words: &[&str],
-        flags: &[String],
-        listen: Option<String>,
-    ) -> Result<Self, Error> {
+    fn launch(binary: &Path, flags: &[String], listen: Option<String>) -> Result<Self, Error> {
         let cannot = |error: std::io::Error| {
             let message = format!("cannot start {}: {error}", binary.display());
             Error::new(Kind::ServerNotFound, "SERVER_NOT_FOUND", message)
@@ -116,7 +95,7 @@ impl Server {
         let private = listen.is_none();
         let socket = || format!("unix:{}", folder.join("socket").display());
         let mut command = Command::new(binary);
-        command.args(words).args(["--exit-with-parent", "--listen"]);
+        command.args(["--exit-with-parent", "--listen"]);
         command.arg(listen.unwrap_or_else(socket));
         command.args(flags).stdin(Stdio::null()).stdout(Stdio::piped()).stderr(Stdio::piped());
         command.process_group(0); // Ctrl-C is for the client
