@@ -5,6 +5,7 @@
 #include "core/base/message.h"
 #include "server/convert/arrays.h"
 #include "server/convert/error_map.h"
+#include "server/convert/points.h"
 #include "server/convert/report_text.h"
 #include "server/convert/spec.h"
 
@@ -36,8 +37,8 @@ v1::CertificateLevel ToProto(core::CertificateLevel level) {
   switch (level) {
     case core::CertificateLevel::kRefused:
       return v1::CERTIFICATE_LEVEL_REFUSED;
-    case core::CertificateLevel::kDecided:  // of reconstructions, which have no rpc yet
-      return v1::CERTIFICATE_LEVEL_UNSPECIFIED;
+    case core::CertificateLevel::kDecided:
+      return v1::CERTIFICATE_LEVEL_DECIDED;
     case core::CertificateLevel::kSampled:
       return v1::CERTIFICATE_LEVEL_SAMPLED;
     case core::CertificateLevel::kProved:
@@ -212,6 +213,9 @@ void ToProto(const core::Report& report, int k, v1::Report* out) {
   out->set_termination(ToProto(report.termination));
   ToProto(report.counts, out->mutable_counts());
   ToProto(report.certificate, k, out->mutable_certificate());
+  if (report.reconstruction) {
+    ToProto(*report.reconstruction, out->mutable_reconstruction());
+  }
 }
 
 void ToProto(const std::vector<WorkerStats>& workers, v1::Mesh* out) {
@@ -242,9 +246,12 @@ void ToProto(const Session& session, v1::Mesh* out) {
   const MeshRequest& request = session.request();
   const SessionView view = session.View();
   out->set_name(request.name);
-  ToProto(request.spec, out->mutable_spec());
+  if (!request.points) {
+    ToProto(request.spec, out->mutable_spec());
+    out->mutable_spec()->mutable_oracle()->set_about(request.about);
+  }
   out->mutable_spec()->set_label(request.label);
-  out->mutable_spec()->mutable_oracle()->set_about(request.about);
+  if (request.points) ToProto(*request.points, out->mutable_spec());
   v1::MeshLimits* const limits = out->mutable_spec()->mutable_limits();
   limits->set_worker_wait_seconds(
       std::chrono::duration<double>(request.timeouts.worker_wait).count());
@@ -301,6 +308,13 @@ void ToProto(const DeltaPart& part, int k, int d, v1::DownloadMeshResponse* out)
                                            part.orientation->turned.size());
   }
   out->mutable_cell_labels()->assign(part.labels.begin(), part.labels.end());
+  if (!part.places.empty()) {
+    out->mutable_places()->mutable_codes()->assign(part.places.begin(), part.places.end());
+  }
+  if (!part.smoothed.empty()) {
+    ToProto(part.smoothed.data(), {part.smoothed.size() / dimension, dimension},
+            out->mutable_places()->mutable_smoothed());
+  }
   out->set_complete(part.complete);
 }
 

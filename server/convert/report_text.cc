@@ -138,6 +138,34 @@ void AddMeasures(const v1::Certificate& c, Entries* entries) {
   entries->Add("declared", Message("a reach of ", Digits(c.declared_reach(), 4), proved));
 }
 
+// What became of the points, and how they lie.
+void AddPoints(const v1::ReconstructionReport& r, Entries* entries) {
+  std::string places;
+  for (const v1::ReconstructionReport::Count& one : r.places()) {
+    std::string name = v1::Place_Name(one.place());
+    if (const std::string_view prefix = "PLACE_"; name.starts_with(prefix)) {
+      name.erase(0, prefix.size());
+    }
+    places += Message(places.empty() ? "" : ", ", Grouped(one.points()), " ", name);
+  }
+  entries->Add("points", places);
+  entries->Add("sample",
+               Message("spacing ", Digits(r.spacing(), 4), ", noise ", Digits(r.noise(), 3), ", ",
+                       Digits(r.noise_ratio(), 3), " of the local spacing",
+                       r.smoothed() ? ": the complex is that of smoothed copies" : ""));
+  entries->Add("stars",
+               Message(Grouped(r.doubtful()), " simplices in doubt at first, in ",
+                       Grouped(r.cavities()), " cavities; ", Grouped(r.tiles()), " tiles, ",
+                       Grouped(r.unfilled_vertices()), " vertices in cavities that are left"));
+}
+
+void AddRefinement(const v1::Counts& n, Entries* entries) {
+  entries->Add("inserted for", Message("size ", Grouped(n.inserted_size()), ", radius-edge ",
+                                       Grouped(n.inserted_radius_edge()), ", slivers ",
+                                       Grouped(n.inserted_sliver()), ", inconsistencies ",
+                                       Grouped(n.inserted_inconsistent())));
+}
+
 }  // namespace
 
 std::string ReportText(const v1::Report& report) {
@@ -146,14 +174,17 @@ std::string ReportText(const v1::Report& report) {
   Entries entries;
   entries.Add("mesh",
               Message(Grouped(n.vertices()), " vertices, ", Grouped(n.simplices()), " simplices"));
-  entries.Add("run", Ending(report.termination()));
-  entries.Add("took",
-              Message(Digits(report.elapsed_seconds(), 2, true), " s, ", Grouped(n.rounds()),
-                      " round trips, ", Grouped(n.queries()), " queries"));
-  entries.Add("inserted for",
-              Message("size ", Grouped(n.inserted_size()), ", radius-edge ",
-                      Grouped(n.inserted_radius_edge()), ", slivers ", Grouped(n.inserted_sliver()),
-                      ", inconsistencies ", Grouped(n.inserted_inconsistent())));
+  const std::string seconds = Message(Digits(report.elapsed_seconds(), 2, true), " s");
+  if (report.has_reconstruction()) {
+    entries.Add("run", "reconstructed from points");
+    entries.Add("took", seconds);
+    AddPoints(report.reconstruction(), &entries);
+  } else {
+    entries.Add("run", Ending(report.termination()));
+    entries.Add("took", Message(seconds, ", ", Grouped(n.rounds()), " round trips, ",
+                                Grouped(n.queries()), " queries"));
+    AddRefinement(n, &entries);
+  }
   if (report.has_failure()) {
     entries.Add("failure", Message(report.failure().reason(), ": ", report.failure().message()));
   }

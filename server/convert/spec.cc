@@ -36,7 +36,8 @@ Status ToInt(std::uint32_t value, const char* field, int* out) {
   return Status::Ok();
 }
 
-Refused ReadDimensions(const v1::MeshSpec& spec, const Config& config, core::Specification* out) {
+template <typename Spec>
+Refused ReadDimensions(const Spec& spec, const Config& config, core::Specification* out) {
   Status status = ToInt(spec.dimension(), "dimension", &out->dimension);
   if (!status.ok()) return status;
   // What no server of this build can do, core::Validate says.
@@ -153,22 +154,26 @@ Refused ReadSeconds(double value, double standard, double most, const char* fiel
   return Status::Ok();
 }
 
-Refused ReadLimits(const v1::MeshSpec& spec, const Config& config, core::Specification* out) {
-  const v1::MeshLimits& limits = spec.limits();
+Refused ReadVertices(std::uint64_t vertices, const char* field, const Config& config,
+                     core::Specification* out) {
   const auto d = std::max<std::uint64_t>(out->ambient_dimension, 1);
   const std::uint64_t room = std::max<std::uint64_t>(config.max_coordinates / d, 1);
-  const std::uint64_t most_vertices = std::min(config.max_vertices, room);
+  const std::uint64_t most = std::min(config.max_vertices, room);
+  out->limits.max_vertices = vertices == 0 ? most : vertices;
+  if (vertices <= most) return Status::Ok();
+  const bool room_binds = room < config.max_vertices;
+  return TooLarge(field, room_binds ? "max-coordinates" : "max-vertices",
+                  room_binds ? config.max_coordinates : config.max_vertices,
+                  Message(field, " is ", vertices, " but this server allows ", most, " in ", d,
+                          " dimensions: ask for fewer, or raise --max-vertices or "
+                          "--max-coordinates"));
+}
+
+Refused ReadLimits(const v1::MeshSpec& spec, const Config& config, core::Specification* out) {
+  const v1::MeshLimits& limits = spec.limits();
   core::Limits& to = out->limits;
-  to.max_vertices = limits.max_vertices() == 0 ? most_vertices : limits.max_vertices();
-  if (to.max_vertices > most_vertices) {
-    const bool room_binds = room < config.max_vertices;
-    return TooLarge("limits.max_vertices", room_binds ? "max-coordinates" : "max-vertices",
-                    room_binds ? config.max_coordinates : config.max_vertices,
-                    Message("limits.max_vertices is ", to.max_vertices, " but this server allows ",
-                            most_vertices, " in ", d,
-                            " dimensions: ask for fewer, or raise --max-vertices or "
-                            "--max-coordinates"));
-  }
+  Refused refused = ReadVertices(limits.max_vertices(), "limits.max_vertices", config, out);
+  if (!refused.ok()) return refused;
   to.max_batch_queries = limits.max_batch_queries();
   to.max_rounds = limits.max_rounds() == 0 ? config.max_rounds : limits.max_rounds();
   if (to.max_rounds > config.max_rounds) {
@@ -177,6 +182,12 @@ Refused ReadLimits(const v1::MeshSpec& spec, const Config& config, core::Specifi
                             config.max_rounds, ": ask for fewer, or raise --max-rounds"));
   }
   return Status::Ok();
+}
+
+Status CheckLabel(const std::string& label) {
+  if (label.size() <= kMaxLabelBytes) return Status::Ok();
+  return Invalid("label", Message("label has ", label.size(), " bytes but may have ",
+                                  kMaxLabelBytes, ": shorten it"));
 }
 
 // What others are shown as the words of an oracle.
@@ -242,6 +253,15 @@ Refused ReadClosures(const v1::MeshSpec& spec, core::Specification* to) {
 
 }  // namespace
 
+Refused ReadCommon(const v1::Reconstruction& spec, const Config& config, MeshRequest* out) {
+  out->label = spec.label();
+  Refused refused = ReadDimensions(spec, config, &out->spec);
+  if (refused.ok()) refused = ReadVertices(spec.points(), "points", config, &out->spec);
+  if (refused.ok()) refused = ReadTimeouts(spec.limits(), config, &out->timeouts);
+  if (refused.ok()) refused = CheckLabel(out->label);
+  return refused;
+}
+
 Allowed<MeshRequest> ReadSpec(const v1::MeshSpec& spec, const Config& config) {
   MeshRequest request;
   request.spec.epsilon = spec.epsilon();
@@ -261,9 +281,10 @@ Allowed<MeshRequest> ReadSpec(const v1::MeshSpec& spec, const Config& config) {
   if (status.ok()) status = ReadCriteria(spec, &request.spec);
   if (status.ok()) status = ReadLimits(spec, config, &request.spec);
   if (status.ok()) status = ReadTimeouts(spec.limits(), config, &request.timeouts);
-  if (status.ok() && request.label.size() > kMaxLabelBytes) {
-    status = Invalid("label", Message("label has ", request.label.size(), " bytes but may have ",
-                                      kMaxLabelBytes, ": shorten it"));
+  if (status.ok()) status = CheckLabel(request.label);
+  if (status.ok() && spec.has_reconstruction()) {
+    status = Invalid("reconstruction",
+                     "reconstruction is set, but a mesh of points is made by the rpc Reconstruct");
   }
   if (status.ok()) status = CheckAbout(request.about);
   if (!status.ok()) return tl::unexpected(std::move(status));

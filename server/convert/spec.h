@@ -16,6 +16,10 @@ Allowed<MeshRequest> FromProto(const v1::MeshSpec& spec, const Config& config);
 // The same without core::Validate: its result may make no sense as a mesh.
 Allowed<MeshRequest> ReadSpec(const v1::MeshSpec& spec, const Config& config);
 
+// What a reconstruction has in common with that: dimensions, label, times, and its number of points
+// as that of vertices.
+Refused ReadCommon(const v1::Reconstruction& spec, const Config& config, MeshRequest* out);
+
 // Without the seeds: there may be many, and the client that needs them sent them.
 void ToProto(const core::Specification& spec, v1::MeshSpec* out);
 

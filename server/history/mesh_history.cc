@@ -60,6 +60,7 @@ MeshHistory::MeshHistory(int dimension, int ambient_dimension)
     : row_size_(static_cast<std::size_t>(dimension) + 1),
       d_(ambient_dimension),
       points_(d_),
+      smoothed_(d_),
       rows_(row_size_),
       lives_(1),
       labels_(1),
@@ -83,7 +84,7 @@ void MeshHistory::Link(std::uint32_t simplex) {
   first = simplex;
 }
 
-Status MeshHistory::Append(const core::MeshDelta& delta) {
+Status MeshHistory::Append(const core::MeshDelta& delta, const PointPlaces& places) {
   // The appending thread alone writes, so it reads without the lock.
   const std::uint64_t revision = marks_.size();
   const Mark& last = marks_.back();
@@ -119,6 +120,15 @@ Status MeshHistory::Append(const core::MeshDelta& delta) {
     }
     dying.push_back(simplex);
   }
+  const std::size_t vertices = last.vertices + new_vertices;
+  const auto smoothed = static_cast<std::size_t>(places.smoothed.cols());
+  if ((!places.codes.empty() && places.codes.size() != vertices) ||
+      (smoothed > 0 && smoothed != vertices)) {
+    for (const std::uint32_t other : dying) Link(other);
+    return OutOfStep(core::Message("revision ", revision, " tells the places of ",
+                                   places.codes.size(), " points and the positions of ", smoothed,
+                                   ", and has ", vertices));
+  }
   const std::vector<Life> births(new_simplices, Life{revision, 0});
   {
     const std::lock_guard lock(mutex_);
@@ -130,6 +140,8 @@ Status MeshHistory::Append(const core::MeshDelta& delta) {
     rows_.Append(delta.added.data(), new_simplices);
     lives_.Append(births.data(), new_simplices);
     labels_.Append(delta.labels.data(), delta.labels.size());
+    if (!places.codes.empty()) places_ = places.codes;
+    smoothed_.Append(places.smoothed.data(), smoothed);
     marks_.push_back({last.vertices + new_vertices, first_simplex + new_simplices, deaths_.size()});
   }
   first_of_.resize(marks_.back().vertices, kNone);
@@ -189,7 +201,7 @@ bool MeshHistory::Write(const Sink& write) const {
   return write(&revisions, sizeof(revisions)) &&
          write(marks_.data() + 1, revisions * sizeof(Mark)) && WriteRows(points_, d_, write) &&
          WriteRows(rows_, row_size_, write) && WriteRows(deaths_, 1, write) && WriteWalls(write) &&
-         WriteOrientation(write) && WriteLabels(write);
+         WriteOrientation(write) && WritePlaces(write) && WriteLabels(write);
 }
 
 bool MeshHistory::WriteWalls(const Sink& write) const {
@@ -236,6 +248,24 @@ bool MeshHistory::ReadOrientation(const Source& read) {
           read(orientation_->turned.data(), orientation_->turned.size()));
 }
 
+bool MeshHistory::WritePlaces(const Sink& write) const {
+  const std::uint64_t counts[] = {places_.size(), smoothed_.size()};
+  return write(counts, sizeof(counts)) &&
+         (places_.empty() || write(places_.data(), places_.size())) &&
+         WriteRows(smoothed_, d_, write);
+}
+
+bool MeshHistory::ReadPlaces(const Source& read) {
+  std::uint64_t counts[2];
+  const std::uint64_t vertices = marks_.back().vertices;
+  if (!read(counts, sizeof(counts))) return false;
+  for (const std::uint64_t count : counts)
+    if (count != 0 && count != vertices) return false;
+  places_.resize(counts[0]);  // no more than the points, which have been read
+  return (places_.empty() || read(places_.data(), places_.size())) &&
+         ReadInto(&smoothed_, d_, counts[1], read);
+}
+
 bool MeshHistory::WriteLabels(const Sink& write) const {
   return labels_.size() == 0 || WriteRows(labels_, 1, write);
 }
@@ -275,7 +305,7 @@ bool MeshHistory::ReadRows(const Source& read) {
          ReadInto(&points_, d_, end.vertices, read) &&
          ReadInto(&rows_, row_size_, end.simplices, read) &&
          ReadInto(&deaths_, 1, end.deaths, read) && ReadWalls(read) && ReadOrientation(read) &&
-         ReadLabels(read);
+         ReadPlaces(read) && ReadLabels(read);
 }
 
 // From the order of births and deaths.
@@ -310,10 +340,10 @@ MeshHistory::Cursor MeshHistory::Begin(std::uint64_t from) const {
 
 std::uint64_t MeshHistory::MemoryBytes() const {
   const std::lock_guard lock(mutex_);
-  return points_.bytes() + labels_.bytes() + boundary_.capacity() * sizeof(OnWalls) +
-         turned_by_row_.capacity() + (orientation_ ? orientation_->turned.capacity() : 0) +
-         rows_.bytes() + lives_.bytes() + deaths_.bytes() + marks_.capacity() * sizeof(Mark) +
-         appenders_bytes_;
+  return points_.bytes() + places_.capacity() + smoothed_.bytes() + labels_.bytes() +
+         boundary_.capacity() * sizeof(OnWalls) + turned_by_row_.capacity() +
+         (orientation_ ? orientation_->turned.capacity() : 0) + rows_.bytes() + lives_.bytes() +
+         deaths_.bytes() + marks_.capacity() * sizeof(Mark) + appenders_bytes_;
 }
 
 MeshHistory::Snapshot MeshHistory::At(std::uint64_t revision) const {
@@ -326,14 +356,17 @@ MeshHistory::Cursor MeshHistory::BeginAt(std::uint64_t revision, std::uint64_t p
   const std::lock_guard lock(mutex_);
   const Mark& mark = marks_[revision];
   const std::size_t vertex = std::min<std::size_t>(position, mark.vertices);
-  const bool is_oriented = orientation_ && revision + 1 == marks_.size();
+  const bool is_last = revision + 1 == marks_.size();
   // Nothing was there at revision 0, so nothing goes.
-  return {0, revision, mark.deaths, vertex, position - vertex, is_oriented};
+  return {0,      revision,          mark.deaths,
+          vertex, position - vertex, is_last && orientation_.has_value(),
+          is_last};
 }
 
 DeltaPart MeshHistory::Next(Cursor* cursor, std::size_t max_bytes) const {
   const std::size_t row_bytes = row_size_ * sizeof(std::uint32_t);
-  const std::size_t point_bytes = d_ * sizeof(double);
+  const bool has_smoothed = cursor->has_places && smoothed_.size() > 0;
+  const std::size_t point_bytes = d_ * sizeof(double) * (has_smoothed ? 2 : 1);
   const std::size_t max_rows = std::max<std::size_t>(max_bytes / row_bytes, 1);
   DeltaPart part;
   part.revision = cursor->to;
@@ -374,6 +407,7 @@ DeltaPart MeshHistory::Next(Cursor* cursor, std::size_t max_bytes) const {
     cursor->vertex += run;
     points -= run;
   }
+  if (cursor->has_places) AppendPlaces(cursor->vertex, &part);
   const auto first_on = std::lower_bound(
       boundary_.begin(), boundary_.end(), part.first_vertex,
       [](const OnWalls& one, std::uint64_t vertex) { return one.vertex < vertex; });
@@ -386,6 +420,19 @@ DeltaPart MeshHistory::Next(Cursor* cursor, std::size_t max_bytes) const {
               room_for(row_bytes, part.removed.empty() && part.points.empty()), &part);
   part.complete = cursor->added == end.simplices;
   return part;
+}
+
+// Of the points of the part, which end there.
+void MeshHistory::AppendPlaces(std::uint64_t end, DeltaPart* part) const {
+  const std::uint64_t first = part->first_vertex;
+  if (!places_.empty()) {
+    part->places.assign(places_.begin() + static_cast<std::ptrdiff_t>(first),
+                        places_.begin() + static_cast<std::ptrdiff_t>(end));
+  }
+  if (smoothed_.size() == 0) return;
+  for (std::uint64_t vertex = first; vertex < end; ++vertex) {
+    part->smoothed.insert(part->smoothed.end(), smoothed_[vertex], smoothed_[vertex] + d_);
+  }
 }
 
 // Alive at `to`, from the cursor on: `max_rows` at most.

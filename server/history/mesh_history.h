@@ -63,6 +63,13 @@ class GrowingRows {
   std::size_t size_ = 0;
 };
 
+// What became of the points of a reconstruction, all of them: a core::Place each, and the positions
+// that the complex was built on, d x n, if they are others. Empty of other meshes.
+struct PointPlaces {
+  std::vector<std::uint8_t> codes;
+  Eigen::MatrixXd smoothed;
+};
+
 // A part of the change from one revision to another.
 struct DeltaPart {
   std::uint64_t revision = 0;  // where the change leads
@@ -73,6 +80,10 @@ struct DeltaPart {
   // The vertices among them that are on walls, and the walls of each.
   std::vector<std::uint32_t> boundary;
   std::vector<core::WallSet> walls;
+  // Of the points, in a download of the end of a reconstruction: what became of each (core::Place),
+  // and, if it is elsewhere, the position that the complex was built on, d each.
+  std::vector<std::uint8_t> places;
+  std::vector<double> smoothed;
   // Of `added`, whose rows are not in lexicographic order; where it is known.
   std::optional<core::Orientation> orientation;
   bool complete = false;  // the last part
@@ -93,9 +104,10 @@ class MeshHistory {
  public:
   MeshHistory(int dimension, int ambient_dimension);
 
-  // Adds a revision. kFailedPrecondition, and no change, if it is not the next one, vertex ids
-  // leave a gap, or a removed simplex does not exist.
-  core::Status Append(const core::MeshDelta& delta);
+  // Adds a revision; the last of a reconstruction has places. kFailedPrecondition, and no change,
+  // if it is not the next one, vertex ids leave a gap, a removed simplex does not exist, or places
+  // are not those of all vertices.
+  core::Status Append(const core::MeshDelta& delta, const PointPlaces& places = {});
 
   // Finds the orientation of the newest revision, which is the last: nothing can be appended then.
   // The appending thread calls this, as work that can be interrupted (core/base/interruption.h),
@@ -122,6 +134,7 @@ class MeshHistory {
     std::uint64_t from = 0, to = 0;
     std::size_t removed = 0, vertex = 0, added = 0;  // next to look at
     bool is_oriented = false;                        // parts have an orientation
+    bool has_places = false;                         // and places
 
     std::uint64_t Position() const { return vertex + added; }
   };
@@ -156,6 +169,9 @@ class MeshHistory {
   std::vector<std::uint32_t> SortLiving() const;
   bool WriteLabels(const Sink& write) const;
   bool ReadLabels(const Source& read);
+  bool WritePlaces(const Sink& write) const;
+  bool ReadPlaces(const Source& read);
+  void AppendPlaces(std::uint64_t end, DeltaPart* part) const;
   bool ComputeLives();
   std::uint32_t Unlink(const std::uint32_t* row);
   void Link(std::uint32_t simplex);
@@ -170,7 +186,10 @@ class MeshHistory {
     std::uint64_t vertex = 0;
     core::WallSet walls = 0;
   };
-  std::vector<OnWalls> boundary_;      // of the vertices, ascending
+  std::vector<OnWalls> boundary_;  // of the vertices, ascending
+  // By vertex, of a reconstruction that is over; else empty. smoothed_: of no or of all vertices.
+  std::vector<std::uint8_t> places_;
+  GrowingRows<double> smoothed_;
   GrowingRows<std::uint32_t> rows_;    // ids of every simplex so far
   GrowingRows<Life> lives_;            // by simplex
   GrowingRows<std::int8_t> labels_;    // by simplex, of an arrangement of walls; else empty

@@ -15,8 +15,9 @@ using core::Message;
 constexpr std::uint64_t kStarBytes[] = {0, 420, 330, 4300, 25'000, 150'000};
 static_assert(std::size(kStarBytes) == core::kMaxDimension + 1);
 constexpr std::uint64_t kEmptyMeshBytes = std::uint64_t{1} << 16;  // one with nothing in it
-constexpr std::uint64_t kFinishedBytes = std::uint64_t{1} << 14;   // without history and seeds
-constexpr std::uint64_t kCallBytes = std::uint64_t{1} << 15;       // that sends nothing
+constexpr std::uint64_t kReconstructedBytes = 500;  // of a point, beside it and its tangent basis
+constexpr std::uint64_t kFinishedBytes = std::uint64_t{1} << 14;  // without history and seeds
+constexpr std::uint64_t kCallBytes = std::uint64_t{1} << 15;      // that sends nothing
 constexpr std::uint64_t kLeastOfStreams = std::uint64_t{4} << 20;
 
 std::uint64_t SeedBytes(const core::Specification& spec) {
@@ -40,6 +41,13 @@ std::uint64_t EstimateMeshBytes(const core::Specification& spec, std::uint64_t v
   const std::uint64_t message = sizeof(double) * d * (k + 2);
   return kEmptyMeshBytes + seeds + vertices * (coordinates + clearances + kStarBytes[k]) +
          queries * message;
+}
+
+std::uint64_t EstimateReconstructionBytes(const core::ReconstructionSpecification& spec,
+                                          std::uint64_t points) {
+  const auto d = static_cast<std::uint64_t>(spec.ambient_dimension);
+  const auto k = static_cast<std::uint64_t>(spec.dimension);
+  return kEmptyMeshBytes + points * (sizeof(double) * d * (k + 1) + kReconstructedBytes);
 }
 
 std::uint64_t EstimateFinishedBytes(const core::Specification& spec) {

@@ -9,6 +9,7 @@
 #include <string>
 #include <utility>
 
+#include "core/reconstruction.h"
 #include "core/specification.h"
 #include "server/base/refusal.h"
 
@@ -19,6 +20,11 @@ namespace stellate::server {
 // (`tests/bench/run memory`), without that of an idle process.
 std::uint64_t EstimateMeshBytes(const core::Specification& spec, std::uint64_t vertices,
                                 std::uint64_t queries);
+
+// Estimates the memory of a reconstruction from `points` points, in bytes, from its declaration to
+// its end.
+std::uint64_t EstimateReconstructionBytes(const core::ReconstructionSpecification& spec,
+                                          std::uint64_t points);
 
 // Estimates the memory of an ended mesh without its history: itself, and its seeds.
 std::uint64_t EstimateFinishedBytes(const core::Specification& spec);

@@ -95,6 +95,8 @@ class Metrics::Impl final : public SessionObserver {
     answered_queries.Increment(static_cast<double>(queries));
   }
 
+  void OnPoints(std::size_t count) override { points.Increment(static_cast<double>(count)); }
+
   void OnEnd(SessionState state, const core::Report& report) override {
     ended.at(state)->Increment();
     (report.certificate.certified ? certified : uncertified).Increment();
@@ -115,6 +117,8 @@ class Metrics::Impl final : public SessionObserver {
   Counter& rounds = Count("stellate_rounds_total", "Rounds of refinement that were answered");
   Counter& answered_queries =
       Count("stellate_queries_total", "Oracle queries of the rounds that were answered");
+  Counter& points =
+      Count("stellate_points_total", "Points of reconstructions that were received and recorded");
   Counter& hedged =
       Count("stellate_hedged_chunks_total", "Overdue chunks that an idle worker received as well");
   Counter& compared = Count("stellate_compared_queries_total",

@@ -56,6 +56,22 @@ void LayOutSpecification(Archive& archive, Value& spec) {
   archive.Number(spec.oracle.conormals);
 }
 
+template <typename Archive, typename Value>
+void LayOutPoints(Archive& archive, Value& points) {
+  if (!archive.Has(points.has_value())) return;
+  if constexpr (!std::is_const_v<Value>) points.emplace();
+  archive.Number(points->points);
+  archive.Number(points->has_tangents);
+  auto& spec = points->spec;
+  archive.Number(spec.dimension);
+  archive.Number(spec.ambient_dimension);
+  archive.Number(spec.closed);
+  archive.Maybe(spec.noise);
+  archive.Number(spec.drop);
+  archive.Maybe(spec.reach);
+  archive.Number(spec.threads);
+}
+
 std::int64_t ToNumber(SystemTime time) {
   return std::chrono::duration_cast<Microseconds>(time.time_since_epoch()).count();
 }
@@ -152,6 +168,7 @@ std::string EncodeStart(const MeshRequest& request, SystemTime create_time) {
   writer.Number(request.timeouts.worker_wait.count());
   LayOutSpecification(writer, request.spec);
   writer.Number(request.timeouts.busy_limit.count());
+  LayOutPoints(writer, request.points);
   return writer.Take();
 }
 
@@ -168,6 +185,7 @@ bool DecodeStart(std::string_view record, MeshRequest* request, SystemTime* crea
   reader.Number(worker_wait);
   LayOutSpecification(reader, request->spec);
   reader.Number(busy_limit);
+  LayOutPoints(reader, request->points);
   *create_time = ToTime(time);
   request->timeouts.answer_limit = Clock::duration(answer_limit);
   request->timeouts.worker_wait = Clock::duration(worker_wait);

@@ -133,6 +133,22 @@ void LayOutPast(RecordReader& archive, ProgressHistory& past) {
   }
 }
 
+template <typename Archive, typename Value>
+void LayOutReconstruction(Archive& archive, Value& counts) {
+  if (!archive.Has(counts.has_value())) return;
+  if constexpr (!std::is_const_v<Value>) counts.emplace();
+  for (auto& points : counts->places) archive.Number(points);
+  archive.Number(counts->spacing);
+  archive.Number(counts->noise);
+  archive.Number(counts->noise_ratio);
+  archive.Number(counts->smoothed);
+  archive.Number(counts->doubtful);
+  archive.Number(counts->cavities);
+  archive.Number(counts->tiles);
+  archive.Number(counts->unfilled_vertices);
+  for (auto& share : counts->looks) archive.Number(share);
+}
+
 // Where walls meet; without walls: they do not.
 template <typename Archive, typename Value>
 void LayOutSharpest(Archive& archive, Value& sharpest) {
@@ -156,6 +172,7 @@ std::string EncodeResult(const SessionResult& result, std::uint64_t parts) {
   const core::WallAngle sharpest = result.report.certificate.sharpest.value_or(core::WallAngle());
   LayOutSharpest(writer, sharpest);
   writer.Number(result.report.certificate.only_too_coarse);
+  LayOutReconstruction(writer, result.report.reconstruction);
   return writer.Take();
 }
 
@@ -179,6 +196,7 @@ std::optional<SessionResult> DecodeResult(std::string_view record, std::uint64_t
     if (sharpest.walls != 0) result.report.certificate.sharpest = std::move(sharpest);
   }
   if (!reader.Complete()) reader.Number(result.report.certificate.only_too_coarse);
+  if (!reader.Complete()) LayOutReconstruction(reader, result.report.reconstruction);
   if (!reader.Complete()) return std::nullopt;
   return result;
 }

@@ -6,6 +6,12 @@
 #include "server/convert/mesh.h"
 
 namespace stellate::server {
+namespace {
+
+// What a mesh records before it gets anywhere: its specification, and some answers.
+constexpr std::uint64_t kFirstRecordBytes = std::uint64_t{1} << 16;
+
+}  // namespace
 
 void Audit(const Session& session, const Identity& caller, const std::string& peer,
            const char* action) {
@@ -57,6 +63,27 @@ tl::expected<Identity, grpc::Status> Identify(ServerState& state,
 grpc::Status Refuse(ServerState& state, const Refused& refused, const std::string& prefix) {
   if (refused.limit) state.metrics.LimitReached(refused.limit->setting);
   return ToGrpc(refused, prefix);
+}
+
+tl::expected<std::shared_ptr<Session>, grpc::Status> DeclareMesh(const Call& call,
+                                                                 MeshRequest request,
+                                                                 const NewMeshBytes& bytes) {
+  ServerState& state = call.state;
+  SessionOptions options;
+  options.request = std::move(request);
+  ApplyServerPolicy(state, &options);
+  if (const auto full = options.ports.memory->Set(bytes.memory)) {
+    return tl::unexpected(Refuse(state, *full));
+  }
+  if (state.journal != nullptr) {
+    const auto no_room =
+        state.journal->RefuseNewMesh(options.request.owner, kFirstRecordBytes + bytes.record);
+    if (no_room) return tl::unexpected(Refuse(state, *no_room));
+  }
+  auto session = state.store.Create(std::move(options));
+  if (!session) return tl::unexpected(Refuse(state, session.error()));
+  Audit(**session, call.caller, call.peer, "create");
+  return std::move(*session);
 }
 
 tl::expected<std::unique_ptr<MemoryBudget::Account>, grpc::Status> CountStream(

@@ -43,6 +43,18 @@ tl::expected<std::shared_ptr<Session>, grpc::Status> FindMesh(const ServerState&
 // Writes the state of a mesh as the caller may see it.
 void ShowMesh(const Call& call, const Session& session, v1::Mesh* mesh);
 
+// What a mesh will take from its declaration on.
+struct NewMeshBytes {
+  std::uint64_t memory = 0;
+  std::uint64_t record = 0;  // besides what every mesh records
+};
+
+// Makes a mesh of a request that has been checked, and whose owner is set, and starts it; or
+// RESOURCE_EXHAUSTED.
+tl::expected<std::shared_ptr<Session>, grpc::Status> DeclareMesh(const Call& call,
+                                                                 MeshRequest request,
+                                                                 const NewMeshBytes& bytes);
+
 // Counts the memory of an open call that sends messages of `part` bytes, while the returned account
 // lives; or RESOURCE_EXHAUSTED.
 tl::expected<std::unique_ptr<MemoryBudget::Account>, grpc::Status> CountStream(

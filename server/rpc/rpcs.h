@@ -26,5 +26,7 @@ grpc::ServerBidiReactor<Incoming<v1::WatchMeshRequest>, v1::WatchMeshResponse>* 
     ServerState& state, grpc::CallbackServerContext* context);
 grpc::ServerBidiReactor<Incoming<v1::DownloadMeshRequest>, v1::DownloadMeshResponse>* DownloadMesh(
     ServerState& state, grpc::CallbackServerContext* context);
+grpc::ServerBidiReactor<Incoming<v1::PointsChunk>, v1::ReconstructReply>* Reconstruct(
+    ServerState& state, grpc::CallbackServerContext* context);
 
 }  // namespace stellate::server

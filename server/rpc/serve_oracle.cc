@@ -101,6 +101,12 @@ class OracleStream final : public ServerStream<v1::ServeOracleRequest, v1::Serve
                              "not answer for it",
                              "hello.mesh"));
     }
+    if ((*mesh)->request().points) {
+      return EndWith(Refusal(v1::ERROR_REASON_INVALID_ARGUMENT,
+                             "the mesh is made of points, and asks no oracle: send them with "
+                             "Reconstruct",
+                             "hello.mesh"));
+    }
     if (hello.worker().size() > kMaxWorkerNameBytes) {
       return EndWith(Refusal(v1::ERROR_REASON_INVALID_ARGUMENT,
                              core::Message("hello.worker has ", hello.worker().size(),

@@ -96,6 +96,7 @@ Rpcs::Rpcs(ServerState* state) : state_(*state) {
   AddUnary("/stellate.v1.Stellate/GetServerInfo", GetServerInfo);
   AddStream("/stellate.v1.Stellate/ServeOracle", ServeOracle);
   AddStream("/stellate.v1.Stellate/Examine", Examine);
+  AddStream("/stellate.v1.Stellate/Reconstruct", Reconstruct);
   AddStream("/stellate.v1.Stellate/WatchMesh", WatchMesh);
   AddStream("/stellate.v1.Stellate/DownloadMesh", DownloadMesh);
 }

@@ -22,8 +22,9 @@ HistoryShelf::HistoryShelf(const SessionOptions& options) : options_(options) {
   CountBytes();
 }
 
-core::Status HistoryShelf::Publish(const core::MeshDelta& delta, const PastProgress& now) {
-  core::Status status = loaded_->Append(delta);  // which only this thread changes
+core::Status HistoryShelf::Publish(const core::MeshDelta& delta, const PastProgress& now,
+                                   const PointPlaces& places) {
+  core::Status status = loaded_->Append(delta, places);  // which only this thread changes
   if (!status.ok()) return status;
   const std::lock_guard lock(mutex_);
   past_.Add(now);

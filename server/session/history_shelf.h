@@ -33,7 +33,8 @@ class HistoryShelf {
 
   // Adds the change of one round, and the progress after it. kFailedPrecondition, and no change, if
   // the round does not follow the last one.
-  core::Status Publish(const core::MeshDelta& delta, const PastProgress& now);
+  core::Status Publish(const core::MeshDelta& delta, const PastProgress& now,
+                       const PointPlaces& places = {});
   // Finds the orientation of the last revision, as work that can be interrupted. Once, before
   // Record.
   void Orient() { loaded_->Orient(); }

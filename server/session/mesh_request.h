@@ -1,9 +1,11 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "core/specification.h"
 #include "server/oracles/dispatch.h"
+#include "server/points/points_request.h"
 
 namespace stellate::server {
 
@@ -15,6 +17,8 @@ struct MeshRequest {
   std::string about;  // what its oracle says of itself, printable
   core::Specification spec;
   OracleTimeouts timeouts;
+  // Set: the mesh is made of points, not of answers. `spec` then has its dimensions alone.
+  std::optional<PointsRequest> points;
 };
 
 // The certificate's verdict as people read it: what the oracle says of itself is its last sentence,

@@ -9,6 +9,7 @@
 
 #include "core/base/arenas.h"
 #include "core/base/message.h"
+#include "server/points/point_rounds.h"
 
 namespace stellate::server {
 namespace {
@@ -47,6 +48,23 @@ LogFields EndFields(const MeshRequest& request, const SessionEnd& end, bool susp
   return fields;
 }
 
+std::uint64_t BytesOf(const MeshRequest& request, std::uint64_t vertices, std::uint64_t queries) {
+  return request.points ? EstimateReconstructionBytes(request.points->spec, request.points->points)
+                        : EstimateMeshBytes(request.spec, vertices, queries);
+}
+
+std::unique_ptr<PointIntake> IntakeOf(const MeshRequest& request) {
+  if (!request.points) return nullptr;
+  return std::make_unique<PointIntake>(*request.points, request.timeouts.worker_wait);
+}
+
+core::Expected<std::unique_ptr<core::Mesher>> Begin(const MeshRequest& request,
+                                                    const Session::MesherFactory& factory,
+                                                    PointIntake* intake) {
+  if (intake == nullptr) return factory(request.spec);
+  return std::make_unique<PointRounds>(*request.points, &intake->watch(), &intake->places());
+}
+
 Life FirstLife(const std::optional<SessionRecord>& record) {
   if (!record) return Life::kMeshing;
   if (record->result) return Life::kOver;
@@ -67,6 +85,7 @@ Session::Session(SessionOptions options, const MesherFactory& factory)
       factory_(options_.examiner ? options_.examiner : factory),
       pool_(request().spec, DispatchOptions{request().timeouts, policy().dispatch},
             policy().max_workers, ports().observer),
+      intake_(IntakeOf(request())),
       history_(options_),
       create_time_(options_.record ? options_.record->create_time
                                    : std::chrono::system_clock::now()),
@@ -83,13 +102,14 @@ Session::Session(SessionOptions options, const MesherFactory& factory)
   report_ = options_.record->result->report;
   progress_ = options_.record->result->progress;
   pool_.Shut();
+  if (intake_ != nullptr) intake_->Close({});
 }
 
 void Session::Run() {
   std::unique_ptr<core::Mesher> mesher;
   std::optional<core::Report> report;
   try {
-    auto made = factory_(request().spec);
+    auto made = Begin(request(), factory_, intake_.get());
     if (made) {
       mesher = std::move(*made);
       SetInterruptible(mesher.get());
@@ -131,11 +151,15 @@ void Session::SetInterruptible(core::Mesher* mesher) {
 }
 
 void Session::RunRounds(core::Mesher* mesher) {
-  Log(LogLevel::kInfo, log_context(), IsReplaying() ? "replaying" : "meshing",
-      WhatItIs(request())
-          .Add("dimension", request().spec.dimension)
-          .Add("ambient_dimension", request().spec.ambient_dimension)
-          .Add("epsilon", request().spec.epsilon));
+  LogFields what = WhatItIs(request());
+  what.Add("dimension", request().spec.dimension)
+      .Add("ambient_dimension", request().spec.ambient_dimension);
+  if (request().points) {
+    what.Add("points", request().points->points);
+  } else {
+    what.Add("epsilon", request().spec.epsilon);
+  }
+  Log(LogLevel::kInfo, log_context(), IsReplaying() ? "replaying" : "meshing", what);
   if (ports().journal != nullptr && !options_.record) {
     if (auto failure = ports().journal->WriteStart(request(), create_time_)) {
       FailBlameless(mesher, std::move(*failure));
@@ -149,7 +173,11 @@ void Session::RunRounds(core::Mesher* mesher) {
       if (auto failure = PublishRound(mesher)) FailBlameless(mesher, std::move(*failure));
       return;
     }
-    if (options_.record && batch->round <= options_.record->rounds) {
+    const bool is_known = options_.record && batch->round <= options_.record->rounds;
+    // Once the points are there, and nobody has seen an end, the rest is no replay but the work.
+    const bool is_work =
+        intake_ != nullptr && batch->size() == 0 && is_known && !options_.record->end;
+    if (is_known && !is_work) {
       ReplayRound(mesher, *batch);
     } else if (server::IsReplaying(now)) {
       EndReplay(mesher, batch->round);
@@ -160,13 +188,13 @@ void Session::RunRounds(core::Mesher* mesher) {
 }
 
 std::uint64_t Session::ReplayBytes() const {
-  return EstimateMeshBytes(request().spec, options_.record ? options_.record->last.vertices : 0, 0);
+  return BytesOf(request(), options_.record ? options_.record->last.vertices : 0, 0);
 }
 
 void Session::ReplayRound(core::Mesher* mesher, const core::QueryBatch& batch) {
   if (ports().memory != nullptr) {
-    const std::uint64_t bytes = EstimateMeshBytes(request().spec, mesher->progress().vertices,
-                                                  static_cast<std::uint64_t>(batch.size()));
+    const std::uint64_t bytes =
+        BytesOf(request(), mesher->progress().vertices, static_cast<std::uint64_t>(batch.size()));
     ports().memory->SetUnchecked(std::max(bytes, ReplayBytes()));  // its own, all the while
   }
   SessionJournal::Known known = ports().journal->BeginRound(batch);
@@ -203,8 +231,7 @@ void Session::RepeatEnd(core::Mesher* mesher) {
 // False, and the mesh has failed, if it has grown beyond what the server can hold.
 bool Session::FitsMemory(core::Mesher* mesher, std::uint64_t queries) {
   if (ports().memory == nullptr) return true;
-  auto refused =
-      ports().memory->Set(EstimateMeshBytes(request().spec, mesher->progress().vertices, queries));
+  auto refused = ports().memory->Set(BytesOf(request(), mesher->progress().vertices, queries));
   if (refused) FailBlameless(mesher, ToMeshFailure(*refused));
   return !refused;
 }
@@ -214,12 +241,8 @@ void Session::RunRound(core::Mesher* mesher, const std::shared_ptr<const core::Q
   SessionJournal::Known known;
   if (ports().journal != nullptr) known = ports().journal->BeginRound(*batch);
   if (known.failure) return FailBlameless(mesher, std::move(*known.failure));
-  OraclePool::Outcome outcome = pool_.Ask(
-      batch,
-      [&] {
-        if (auto failure = PublishRound(mesher)) pool_.Fail(std::move(*failure));
-      },
-      known.parts);
+  const bool is_recorded = ports().journal == nullptr || known.answers.has_value();
+  OraclePool::Outcome outcome = Ask(mesher, batch, std::move(known));
   if (outcome.failure) {
     // The worker at fault has been told on its own stream; the others are blameless.
     FailBlameless(mesher, std::move(*outcome.failure));
@@ -227,7 +250,7 @@ void Session::RunRound(core::Mesher* mesher, const std::shared_ptr<const core::Q
   }
   if (!outcome.round) return;  // interrupted: the caller cancels
   const core::Answers& answers = outcome.round->answers;
-  if (ports().journal != nullptr) {
+  if (!is_recorded) {
     const Standing standing{mesher->progress().vertices, Seconds(Clock::now() - created_)};
     if (auto failure = ports().journal->WriteRound(*batch, answers, standing)) {
       FailBlameless(mesher, std::move(*failure));
@@ -236,14 +259,42 @@ void Session::RunRound(core::Mesher* mesher, const std::shared_ptr<const core::Q
   }
   const auto queries = static_cast<std::size_t>(batch->size());
   if (!Absorb(mesher, answers)) return;
-  if (ports().observer != nullptr) ports().observer->OnRound(queries);
+  if (ports().observer != nullptr) {
+    intake_ == nullptr ? ports().observer->OnRound(queries) : ports().observer->OnPoints(queries);
+  }
   if (LogEnabled(LogLevel::kDebug)) {
     Log(LogLevel::kDebug, {request().name, batch->round, request().owner}, "round answered",
         LogFields().Add("queries", queries).Add("vertices", mesher->progress().vertices));
   }
 }
 
+OraclePool::Outcome Session::Ask(core::Mesher* mesher,
+                                 const std::shared_ptr<const core::QueryBatch>& batch,
+                                 SessionJournal::Known known) {
+  if (intake_ == nullptr) {
+    return pool_.Ask(
+        batch,
+        [&] {
+          if (auto failure = PublishRound(mesher)) pool_.Fail(std::move(*failure));
+        },
+        known.parts);
+  }
+  OraclePool::Outcome outcome;
+  outcome.failure = PublishRound(mesher);
+  if (outcome.failure) return outcome;
+  if (!known.answers) {
+    PointIntake::Outcome came = intake_->Ask(*batch);
+    outcome.failure = std::move(came.failure);
+    known.answers = std::move(came.answers);
+  }
+  if (known.answers) {
+    outcome.round = std::make_shared<Round>(Round{batch, std::move(*known.answers), {}});
+  }
+  return outcome;
+}
+
 bool Session::Absorb(core::Mesher* mesher, const core::Answers& answers) {
+  if (intake_ != nullptr) intake_->Note(answers);
   auto delta = mesher->Absorb(answers);
   if (!delta) {
     // What the round would have led to nobody has seen; a suspended mesh goes on from its answers.
@@ -262,7 +313,8 @@ std::optional<MeshFailure> Session::PublishRound(core::Mesher* mesher) {
   if (unseen_) {
     const double seconds = IsReplaying() ? 0 : Seconds(Clock::now() - created_);
     const core::Status published =
-        history_.Publish(*unseen_, {unseen_->revision, mesher->progress(), seconds});
+        history_.Publish(*unseen_, {unseen_->revision, mesher->progress(), seconds},
+                         intake_ != nullptr ? std::exchange(intake_->places(), {}) : PointPlaces());
     unseen_.reset();
     if (!published.ok()) {
       return MeshFailure{FailureReason::kInternal,
@@ -374,6 +426,7 @@ void Session::ShowEnd(const Ending& ending) {
       log_context(), ending.is_suspended ? "mesh suspended until the server is back" : "mesh ended",
       fields);
   pool_.Close({blame_});
+  if (intake_ != nullptr) intake_->Close(blame_);
   history_.WakeWatchers();
 }
 

@@ -10,6 +10,7 @@
 #include "core/mesher.h"
 #include "server/base/log.h"
 #include "server/oracles/oracle_pool.h"
+#include "server/points/point_intake.h"
 #include "server/session/history_shelf.h"
 #include "server/session/session_life.h"
 #include "server/session/session_options.h"
@@ -24,17 +25,17 @@ struct SessionView {
   std::uint64_t revision = 0;
   core::Progress progress;
   double elapsed_seconds = 0;
-  double remaining_seconds = 0;        // 0: unknown
-  std::optional<core::Report> report;  // once it is over
-  MeshFailure failure;                 // when it failed
-  std::size_t workers = 0, watchers = 0;
-  std::size_t waiting_queries = 0;  // of this round, unanswered
-  std::uint64_t bytes = 0;          // estimated; 0 where memory is not counted
+  double remaining_seconds = 0;           // 0: unknown
+  std::optional<core::Report> report;     // once it is over
+  MeshFailure failure;                    // when it failed
+  std::size_t workers = 0, watchers = 0;  // an upload of points is a worker
+  std::size_t waiting_queries = 0;        // of this round, unanswered; points that have not come
+  std::uint64_t bytes = 0;                // estimated; 0 where memory is not counted
 };
 
 // Runs one mesh: passes a core::Mesher's queries to the pool, publishes each round to the history,
-// and records everything in the journal. session_life.h has its states and transitions. Does not
-// use the network.
+// and records everything in the journal. A reconstruction's rounds are its points, and come from
+// the intake instead. session_life.h has its states and transitions. Does not use the network.
 //
 //   auto session = std::make_shared<Session>(options);
 //   std::thread thread([session] { session->Run(); });
@@ -76,6 +77,7 @@ class Session {
   const MeshPolicy& policy() const { return options_.policy; }
   const SessionPorts& ports() const { return options_.ports; }
   OraclePool& pool() { return pool_; }
+  PointIntake* intake() { return intake_.get(); }  // of a reconstruction alone; else null
   HistoryShelf& history() { return history_; }
   const HistoryShelf& history() const { return history_; }
 
@@ -97,6 +99,9 @@ class Session {
   void EndReplay(core::Mesher* mesher, std::uint64_t next_round);
   void RepeatEnd(core::Mesher* mesher);
   void RunRound(core::Mesher* mesher, const std::shared_ptr<const core::QueryBatch>& batch);
+  OraclePool::Outcome Ask(core::Mesher* mesher,
+                          const std::shared_ptr<const core::QueryBatch>& batch,
+                          SessionJournal::Known known);
   bool FitsMemory(core::Mesher* mesher, std::uint64_t queries);
   bool Absorb(core::Mesher* mesher, const core::Answers& answers);
   std::optional<MeshFailure> PublishRound(core::Mesher* mesher);
@@ -112,6 +117,7 @@ class Session {
   const SessionOptions options_;
   const MesherFactory factory_;
   OraclePool pool_;
+  const std::unique_ptr<PointIntake> intake_;  // of a reconstruction alone
   HistoryShelf history_;
   const std::chrono::system_clock::time_point create_time_;
   const TimePoint created_;  // as if no time had passed without a server

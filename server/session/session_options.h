@@ -18,6 +18,7 @@ namespace stellate::server {
 class SessionObserver : public PoolObserver {
  public:
   virtual void OnRound(std::size_t queries) = 0;  // answered
+  virtual void OnPoints(std::size_t points) = 0;  // of a reconstruction, recorded
   virtual void OnEnd(SessionState state, const core::Report& report) = 0;
 };
 

@@ -232,7 +232,8 @@ std::size_t SessionStore::Running() const {
 std::size_t SessionStore::Served() const {
   const std::lock_guard lock(mutex_);
   return std::count_if(entries_.begin(), entries_.end(), [](const auto& e) {
-    return !e.second.session->Over() && e.second.session->pool().workers() > 0;
+    const Session& session = *e.second.session;
+    return !session.Over() && session.View().state == SessionState::kRunning;
   });
 }
 

@@ -72,7 +72,7 @@ class SessionStore {
   std::vector<std::shared_ptr<Session>> All() const;  // of all owners
 
   std::size_t Running() const;
-  std::size_t Served() const;  // running, with a worker
+  std::size_t Served() const;  // running, with a worker or all that they need
   // Deletes finished meshes that were kept long enough, and those beyond an owner's number: first
   // the ones without a vertex, then the oldest, but none of these within a minute of its end. So,
   // where clients are not authenticated, one client cannot evict another's result by creating and

@@ -17,6 +17,7 @@ void Session::Step(LifeEvent event) {
     if (computing_ != nullptr) computing_->Interrupt();
   }
   pool_.Interrupt();
+  if (intake_ != nullptr) intake_->Interrupt();
 }
 
 void Session::Cancel() { Step(LifeEvent::kCancel); }
@@ -41,6 +42,7 @@ void Session::AbandonUnrun() {
     report_ = core::Report{};
   }
   pool_.Close({});
+  if (intake_ != nullptr) intake_->Close({});
   history_.WakeWatchers();
 }
 
@@ -57,6 +59,12 @@ SessionView Session::View() const {
   view.waiting_queries = pool_.waiting();
   view.watchers = history_.watchers();
   if (ports().memory != nullptr) view.bytes = ports().memory->bytes();
+  bool is_served = view.workers > 0;
+  if (intake_ != nullptr) {
+    view.workers = intake_->is_joined() ? 1 : 0;
+    is_served = view.workers > 0 || intake_->is_complete();
+    view.waiting_queries = request().points->points - intake_->rows();
+  }
   const std::lock_guard lock(mutex_);
   view.revision = history_.revision();  // with the lock: the last one, where the end is seen
   view.progress = progress_;
@@ -71,8 +79,9 @@ SessionView Session::View() const {
   }
   view.elapsed_seconds = std::chrono::duration<double>(Clock::now() - created_).count();
   view.state = IsSeenAsCancelled(life_.now()) ? SessionState::kCancelled
-               : view.workers == 0            ? SessionState::kWaiting
-                                              : SessionState::kRunning;
+               : is_served                    ? SessionState::kRunning
+                                              : SessionState::kWaiting;
+  if (intake_ != nullptr) intake_->Show(&view.progress);
   if (view.state == SessionState::kRunning && view.progress.is_foreseeable) {
     view.remaining_seconds =
         view.elapsed_seconds * (1 - view.progress.fraction) / view.progress.fraction;

@@ -200,6 +200,7 @@ export function verdictOf(mesh: Mesh): Verdict | null {
   const headline = {
     [CertificateLevel.PROVED]: "Proved",
     [CertificateLevel.SAMPLED]: "Certified",
+    [CertificateLevel.DECIDED]: "A manifold, not certified",
     [CertificateLevel.REFUSED]: unfinished ? `Not certified: ${state}` : "Not certified",
     [CertificateLevel.UNSPECIFIED]: certificate.certified ? "Certified" : "Not certified",
   }[level];

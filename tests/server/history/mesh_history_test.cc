@@ -396,5 +396,32 @@ TEST(MeshHistory, IsReadBackWithItsOrientation) {
   EXPECT_FALSE((*read)->orientation()->orientable);
 }
 
+TEST(Places, ComeWithThePointsOfTheLastRevision) {
+  MeshHistory mesh(kDimension, kAmbient);
+  const PointPlaces places{{0, 1, 2, 10}, Eigen::MatrixXd::Random(kAmbient, 4)};
+  ASSERT_TRUE(mesh.Append(Delta(1, 0, 4, {}, {})).ok());
+  EXPECT_FALSE(mesh.Append(Delta(2, 4, 0, {{0, 1, 2}}, {}), {{0, 1}, {}}).ok()) << "two of four";
+  ASSERT_TRUE(mesh.Append(Delta(2, 4, 0, {{0, 1, 2}}, {}), places).ok());
+  const auto read = Written(mesh).Read();
+  ASSERT_TRUE(read);
+  for (const MeshHistory* const history :
+       std::initializer_list<const MeshHistory*>{&mesh, read->get()}) {
+    std::vector<std::uint8_t> codes;
+    std::vector<double> smoothed;
+    MeshHistory::Cursor cursor = history->BeginAt(2, 0);
+    DeltaPart part;
+    do {
+      part = history->Next(&cursor, 100);  // two points at a time
+      EXPECT_LE(part.places.size(), 2u);
+      codes.insert(codes.end(), part.places.begin(), part.places.end());
+      smoothed.insert(smoothed.end(), part.smoothed.begin(), part.smoothed.end());
+    } while (!part.complete);
+    EXPECT_EQ(codes, places.codes);
+    EXPECT_EQ(Eigen::Map<Eigen::MatrixXd>(smoothed.data(), kAmbient, 4), places.smoothed);
+    cursor = history->BeginAt(1, 0);
+    EXPECT_TRUE(history->Next(&cursor, 1000).places.empty()) << "it was not known then";
+  }
+}
+
 }  // namespace
 }  // namespace stellate::server
