@@ -7,7 +7,8 @@
 `stellate.Oracle` says what an oracle is, and `stellate.check` whether yours is one.
 `stellate.ImplicitManifold` makes one from equations, `stellate.ImplicitSolid` a solid,
 `stellate.oracles` makes them of charts, distances, points and triangles, and cuts them by walls,
-`stellate.CommandOracle` of a program, and `stellate.manifolds` has a few ready.
+`stellate.CommandOracle` of a program, and `stellate.manifolds` has a few ready. Where there are only
+points, `stellate.reconstruct` makes the mesh of them.
 
 What fewer need is in modules of its own: `stellate.executors`, an oracle on many processes and
 machines; `stellate.pulling`, on a thread of yours alone; `stellate.client`, a server call by call;
@@ -38,6 +39,7 @@ from ._faces import Face  # noqa: E402
 from ._files.formats import check_save  # noqa: E402
 from ._findings import CheckReport, Finding  # noqa: E402
 from ._mesh import FinishedMesh, Mesh, load_txt  # noqa: E402
+from ._reconstruct import reconstruct  # noqa: E402
 from ._series import save_series  # noqa: E402
 from ._version import __version__ as __version__  # noqa: E402
 from .client import Client  # noqa: E402
@@ -73,6 +75,7 @@ __all__ = [
     "oracles",
     "mesh",
     "progress_bar",
+    "reconstruct",
     "save_series",
     "serve",
     "watch",

@@ -17,6 +17,7 @@ _INSTALL = {
     "pyvista": "pip install pyvista",
     "trimesh": "pip install trimesh",
     "open3d": "apt-get install python3-open3d, or pip install open3d",
+    "gudhi": "apt-get install python3-gudhi, or pip install gudhi",
 }
 
 
@@ -54,6 +55,14 @@ def to_open3d(mesh: Complex, cells: np.ndarray) -> Any:
     if mesh.dimension == 1:
         return open3d.geometry.LineSet(points, open3d.utility.Vector2iVector(cells))
     return open3d.geometry.TriangleMesh(points, open3d.utility.Vector3iVector(cells))
+
+
+def to_simplex_tree(mesh: Complex) -> Any:
+    """Mesh.simplex_tree."""
+    tree = _module("gudhi").SimplexTree()
+    for simplex in mesh.simplices.tolist():
+        tree.insert(simplex, 0.0)
+    return tree
 
 
 def _module(name: str) -> Any:

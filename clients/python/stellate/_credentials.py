@@ -82,6 +82,7 @@ class _Details(grpc.ClientCallDetails):
 class _Token(
     grpc.UnaryUnaryClientInterceptor,
     grpc.UnaryStreamClientInterceptor,
+    grpc.StreamUnaryClientInterceptor,
     grpc.StreamStreamClientInterceptor,
 ):
     """Sends the token along. gRPC's own call credentials are refused on plain text."""
@@ -96,4 +97,5 @@ class _Token(
 
     intercept_unary_unary = _send
     intercept_unary_stream = _send
+    intercept_stream_unary = _send
     intercept_stream_stream = _send

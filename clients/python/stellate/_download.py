@@ -10,7 +10,8 @@ import numpy as np
 from ._files.formats import check_save
 from ._info import MeshInfo, unless_failed
 from ._mesh import Mesh, with_report
-from ._wire.arrays import from_wire, indices_from_wire
+from ._wire import enums
+from ._wire.arrays import from_wire, indices_from_wire, places_from_wire
 from ._wire.delta_mesh import (
     labels_from_wire,
     lexicographic,
@@ -54,7 +55,7 @@ def fetch(
                 f"{info.progress.vertices} vertices; wait for its end, or take it as it is"
             )
         info = _await_end(client, name, on_progress)
-    mesh = _assemble(client, info, revision, on_part)
+    mesh = assemble(client, info, revision, on_part)
     if not as_it_is:
         unless_failed(mesh, info)
     return mesh
@@ -74,13 +75,15 @@ def _await_end(client: Client, name: str, on_progress: OnProgress | None) -> Mes
     raise protocol_error("it ended the watch too early")
 
 
-def _assemble(client: Client, info: MeshInfo, revision: int, on_part: OnPart | None) -> Mesh:
+def assemble(client: Client, info: MeshInfo, revision: int, on_part: OnPart | None) -> Mesh:
     d, width = info.ambient_dimension, info.dimension + 1
     points, rows = [np.empty((0, d))], [np.empty((0, width), dtype=np.uint32)]
     boundary: list[tuple[np.ndarray, np.ndarray]] = []
     turned: list[np.ndarray] = []  # (m,) bool, of the rows
     orientable: bool | None = True  # None: not told of all
     labels: list[tuple[np.ndarray, np.ndarray]] = []
+    codes: list[np.ndarray] = []  # of the points
+    smoothed: list[np.ndarray] = []
     vertices = simplices = 0
     parts = client.parts(info.name, revision)
     try:
@@ -98,6 +101,10 @@ def _assemble(client: Client, info: MeshInfo, revision: int, on_part: OnPart | N
                     told = Orientation.from_bits(bits.orientable, bits.turned, len(cells))
                     turned.append(told.flags(len(cells) if orientable else 0))
                 labels += labels_from_wire(part.cell_labels, cells)
+                if part.HasField("places"):
+                    told_codes, positions = places_from_wire(part.places, len(block), d)
+                    codes.append(told_codes)
+                    smoothed += [] if positions is None else [positions]
             except ValueError as error:
                 raise protocol_error(str(error)) from error
             if len(block) and part.first_vertex != vertices:
@@ -139,5 +146,15 @@ def _assemble(client: Client, info: MeshInfo, revision: int, on_part: OnPart | N
         spread_walls(boundary, vertices),
         orientation,
         spread_labels(labels, cells),
+        _places(codes, vertices),
+        np.concatenate(smoothed) if sum(map(len, smoothed)) == vertices > 0 else None,
     )
     return with_report(mesh, info.report if last else None)
+
+
+def _places(codes: list[np.ndarray], vertices: int) -> np.ndarray | None:
+    """Their names; None where they are not told of all."""
+    if not codes or sum(map(len, codes)) != vertices:
+        return None
+    found, which = np.unique(np.concatenate(codes), return_inverse=True)
+    return np.array([enums.place(int(code)) for code in found])[which]

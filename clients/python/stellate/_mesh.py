@@ -39,6 +39,10 @@ class Mesh:
         bit i; else None.
       orientation: how the simplices are oriented, as the server says of a mesh that is over; else None.
       labels: of an arrangement of walls, (m,) int8: the region that each simplex is in; else None.
+      places: of a finished reconstruction, (n,) str: what became of each point, "OK", "MERGED", ... (see
+        stellate.reconstruct); else None.
+      smoothed: of a reconstruction from noisy points, (n, d): the positions that the complex was built on
+        and that its certificate is about; None where they are the points.
     """
 
     points: np.ndarray
@@ -49,6 +53,8 @@ class Mesh:
     walls: np.ndarray | None = None
     orientation: Orientation | None = dataclasses.field(default=None, repr=False)
     labels: np.ndarray | None = None
+    places: np.ndarray | None = None
+    smoothed: np.ndarray | None = None
 
     def region(self, label: int) -> Mesh:
         """The part with one label, of the same points. Its boundary is where it ends or meets others."""
@@ -324,6 +330,17 @@ class Mesh:
         """An open3d.geometry.TriangleMesh of a surface, a LineSet of a curve; d <= 3."""
         return _convert.to_open3d(self, formats.cells(self))
 
+    def simplex_tree(self) -> Any:
+        """A gudhi.SimplexTree of the mesh, all of it at the filtration value 0.
+
+            tree = mesh.simplex_tree()
+            tree.compute_persistence(persistence_dim_max=True)
+            print(tree.betti_numbers())
+
+        Vertices are rows of `points`; points in no simplex are not in the tree.
+        """
+        return _convert.to_simplex_tree(self)
+
     def _repr_html_(self) -> str:
         rows = [
             ("dimension", f"{self.dimension} in R^{self.ambient_dimension}", ""),
@@ -371,6 +388,8 @@ def with_report(mesh: Mesh, report: Report | None) -> Mesh:
         mesh.walls,
         mesh.orientation,
         mesh.labels,
+        mesh.places,
+        mesh.smoothed,
     )
 
 

@@ -17,8 +17,10 @@ from ._generated import mesh_pb2
 from ._generated import stellate_pb2 as pb
 from ._generated import stellate_pb2_grpc as rpc
 from ._info import MeshInfo, ServerInfo
+from ._points import CheckedPoints
 from ._reconnect import WAITS, Reconnector, ReconnectPolicy
 from ._streams import Parts, Watch
+from ._upload import Upload
 from ._wire.spec import mesh_spec
 from ._worker import Ask, Worker, answer
 from .errors import InvalidArgument, MeshNotFound, StellateError, from_rpc
@@ -110,6 +112,31 @@ class Client:
     def check(self, oracle: Any, epsilon: float | None = None, *, seed: int = 1) -> CheckReport:
         """Probes an oracle for its contract: see stellate.check."""
         return examine(self, self._stub, oracle, epsilon, seed)
+
+    def declare_points(self, points: CheckedPoints) -> MeshInfo:
+        """Declares a mesh of points, which waits for them. See stellate.reconstruct.
+
+        Not repeated when the server is lost: whether it made the mesh would not be known.
+        """
+        chunks = iter([pb.PointsChunk(spec=points.spec)])
+        attempts = Reconnector(self._policy)
+        try:
+            reply = self._stub.Reconstruct(chunks, timeout=WAITS["call"])
+        except grpc.RpcError as error:
+            attempts.stop()
+            attempts.wait_or_raise(error, from_rpc(error))
+            raise  # not reached: the attempts are stopped
+        attempts.heard()
+        return MeshInfo.from_wire(reply.mesh)
+
+    def upload(self, name: str, points: CheckedPoints, rows: int | None = None) -> Upload:
+        """What sends the points of a mesh that was declared so, `rows` at a time, for a thread to run.
+
+        After a break, of the connection or of an earlier upload, it goes on from what the server has.
+        """
+        most = self.info().max_message_bytes
+        attempts = Reconnector(self._policy, quiet=True)  # the watch tells
+        return Upload(self._stub, attempts, name, points.points, points.tangents, most, rows)
 
     def get(self, name: str) -> MeshInfo:
         """A mesh as it stands. Raises MeshNotFound."""

@@ -23,6 +23,7 @@ __all__ = [
     "RegionCertificate",
     "Failure",
     "Progress",
+    "ReconstructionReport",
     "Report",
     "Violations",
     "WallAngle",
@@ -184,7 +185,9 @@ class Certificate:
     components: int
     euler_characteristic: int
     orientable: bool
-    level: str  # "REFUSED", "SAMPLED" or "PROVED": from the declared reach; else "UNKNOWN"
+    # "REFUSED", "SAMPLED" or "PROVED": from the declared reach; of reconstructions "DECIDED" as well: a
+    # manifold, but the points say too little for more, and it is not certified; else "UNKNOWN"
+    level: str
     declared_reach: float  # 0: none
     reach_refuted: bool  # points of the manifold contradict it; the verdict names them
     proved_distance: float  # PROVED: bounds the Hausdorff distance to the components it meets
@@ -199,6 +202,36 @@ class Certificate:
     regions: tuple[RegionCertificate, ...] = ()  # of an arrangement of walls, by label
     pinched_vertices: int = 0  # where a region touches itself in an edge or a point alone
     only_too_coarse: bool = False  # refused for its size alone: nothing seen contradicts it
+
+
+@dataclasses.dataclass(frozen=True)
+class ReconstructionReport:
+    """What a reconstruction found of its points. Lengths are in the units of the coordinates."""
+
+    places: dict[str, int]  # how many points have which place, "OK", "MERGED", ...
+    advice: dict[str, str]  # of those places that need some: the cause and the cure
+    spacing: float  # median distance of a point to its nearest
+    noise: float  # median rms distance of the points to the surface fitted to them
+    noise_ratio: float  # the same in units of the local spacing
+    smoothed: bool  # the complex was built on copies of the points, moved to the fitted surface
+    doubtful: int  # simplices about which stars disagreed at first
+    cavities: int  # the places that they made up
+    tiles: int  # simplices of the tilings that filled them
+    unfilled_vertices: int  # of the cavities that were left
+    # The share of points around which they look of dimension 1, 2, 3, 4, and more.
+    looks: tuple[float, ...]
+
+    @classmethod
+    def from_wire(cls, message: pb.ReconstructionReport) -> ReconstructionReport:
+        named = [(enums.place(one.place), one) for one in message.places]
+        told = {"places", "advice", "looks"}
+        plain = [f.name for f in dataclasses.fields(cls) if f.name not in told]
+        return cls(
+            places={name: one.points for name, one in named},
+            advice={name: one.advice for name, one in named if one.advice},
+            looks=tuple(message.looks),
+            **{name: getattr(message, name) for name in plain},
+        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -223,6 +256,7 @@ class Report:
     text: str = (
         ""  # all of it in several lines, for people, but for epsilon; each line with its "\n"
     )
+    reconstruction: ReconstructionReport | None = None  # of a mesh of points, else None
 
     @property
     def certified(self) -> bool:
@@ -243,7 +277,7 @@ class Report:
         """All of it as plain values for JSON, with the names of the protocol.
 
         The same as the shell's --report writes, without `text`: what is not known, infinite or no number is None,
-        "failure" is there for a mesh that failed.
+        "failure" is there for a mesh that failed, "reconstruction" for one of points.
         """
         whole: dict[str, Any] = {"termination": self.termination}
         if self.failure is not None:
@@ -252,6 +286,8 @@ class Report:
         whole["epsilon_reason"] = self.epsilon_reason
         whole["counts"] = dataclasses.asdict(self.counts)
         whole["certificate"] = dataclasses.asdict(self.certificate)
+        if self.reconstruction is not None:
+            whole["reconstruction"] = dataclasses.asdict(self.reconstruction)
         whole["elapsed_seconds"] = self.elapsed_seconds
         whole["version"] = __version__
         return _for_json(whole)
@@ -276,7 +312,11 @@ class Report:
         certificate["regions"] = tuple(RegionCertificate(**region) for region in regions)
         if certificate.get("sharpest"):
             certificate["sharpest"] = WallAngle.from_fields(certificate["sharpest"])
+        told = dict(fields.get("reconstruction") or {})  # checkpoints of earlier versions lack it
+        if told:
+            told["looks"] = tuple(told["looks"])
         more = {
+            "reconstruction": ReconstructionReport(**told) if told else None,
             "failure": failure and Failure(**failure),
             "counts": Counts(**fields["counts"]),
             "certificate": Certificate(**certificate),
@@ -296,6 +336,11 @@ class Report:
             elapsed_seconds=message.elapsed_seconds,
             epsilon=epsilon,
             text=message.text,
+            reconstruction=(
+                ReconstructionReport.from_wire(message.reconstruction)
+                if message.HasField("reconstruction")
+                else None
+            ),
         )
 
     def refused(self, why: str) -> Report:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 
@@ -34,6 +35,15 @@ def from_wire(array: pb.Array, *shape: int) -> np.ndarray:
 def indices_from_wire(array: pb.IndexArray, *shape: int) -> np.ndarray:
     """As from_wire, for uint32 indices."""
     return _view(array.shape, array.data, "<u4", shape)
+
+
+def places_from_wire(message: Any, points: int, d: int) -> tuple[np.ndarray, np.ndarray | None]:
+    """The codes of a Places, and the smoothed positions, if they are others."""
+    codes = np.frombuffer(message.codes, np.uint8)
+    if len(codes) != points:
+        raise ValueError(f"places of {len(codes)} points where {points} came")
+    smoothed = from_wire(message.smoothed, points, d) if message.HasField("smoothed") else None
+    return codes, smoothed
 
 
 def _view(found: Iterable[int], data: bytes, dtype: str, expected: tuple[int, ...]) -> np.ndarray:

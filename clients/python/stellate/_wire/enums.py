@@ -26,6 +26,11 @@ def level(number: int) -> str:
     return _name(pb.CertificateLevel, "CERTIFICATE_LEVEL_", number)
 
 
+def place(number: int) -> str:
+    value = pb.Place.DESCRIPTOR.values_by_number.get(number)
+    return UNKNOWN if value is None else value.name.removeprefix("PLACE_")
+
+
 def state(number: int) -> str:
     return _name(pb.MeshState, "MESH_STATE_", number)
 
