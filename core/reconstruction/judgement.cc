@@ -23,12 +23,12 @@ constexpr double kCoordinateError = 1e-15;
 constexpr double kMostlyRight = 0.5;
 constexpr double kSomeOther = 0.1;
 
-Specification SpecificationOf(const ReconstructionSpecification& spec) {
+Specification SpecificationOf(const ReconstructionSpecification& spec, bool has_boundary) {
   Specification result;
   result.dimension = spec.dimension;
   result.ambient_dimension = spec.ambient_dimension;
   result.epsilon = kMaxLength;  // of no size
-  result.walls = spec.closed ? 0 : 1;
+  result.walls = has_boundary ? 1 : 0;
   result.declared_reach = spec.reach;
   return result;
 }
@@ -65,7 +65,7 @@ class Judge {
         mesh_(mesh),
         known_(known),
         counts_(*report->reconstruction),
-        x_(SpecificationOf(spec), mesh, {.converged = true}),
+        x_(SpecificationOf(spec, mesh.faces != nullptr), mesh, {.converged = true}),
         report_(*report) {}
 
   void Run() {
@@ -132,7 +132,8 @@ class Judge {
     c.warnings = x_.findings.warnings();
     const bool is_manifold = x_.findings.clean();
     const bool is_proved = is_manifold && !x_.findings.theorem().empty();
-    const bool is_sampled = is_manifold && known_.against == 0 && LooksRight();
+    const bool is_sampled =
+        is_manifold && known_.against == 0 && LooksRight() && mesh_.faces == nullptr;
     c.certified = is_sampled || is_proved;
     c.level = is_proved     ? CertificateLevel::kProved
               : is_sampled  ? CertificateLevel::kSampled
@@ -141,9 +142,18 @@ class Judge {
     c.verdict = Verdict();
   }
 
+  // Why a manifold is not certified.
+  std::string WhatIsMissing() const {
+    if (known_.against > 0) return DescribeCauses(mesh_, known_);
+    if (!LooksRight())
+      return Message("most places do not look ", spec_.dimension, "-dimensional, see the warnings");
+    return "it has a boundary where they end, and points alone do not tell an end from a part that "
+           "they are too few for";
+  }
+
   std::string Verdict() const {
     const Certificate& c = x_.certificate;
-    const std::string what = DescribeManifold(spec_.dimension, !spec_.closed, c);
+    const std::string what = DescribeManifold(spec_.dimension, mesh_.faces != nullptr, c);
     const char* const unseen =
         " Parts of the manifold without points, and components of it, cannot be excluded.";
     switch (c.level) {
@@ -154,20 +164,15 @@ class Judge {
                        unseen);
       case CertificateLevel::kSampled:
         return Message(
-            "Certified: ", what, ". Decided on the whole mesh: ",
-            spec_.closed ? "it is closed" : "its links are spheres and balls",
-            ", and each star embeds in the tangent space of its centre. The points agree: at each "
-            "the noise is below half of the spacing, no other part of the manifold is as near as "
-            "the "
-            "neighbours, and tangent spaces turn by less than 60 degrees along each edge.",
+            "Certified: ", what,
+            ". Decided on the whole mesh: it is closed, and each star embeds in the tangent space "
+            "of its centre. The points agree: at each the noise is below half of the spacing, no "
+            "other part of the manifold is as near as the neighbours, and tangent spaces turn by "
+            "less than 60 degrees along each edge.",
             unseen);
       case CertificateLevel::kDecided:
         return Message("Not certified: the mesh is ", what,
-                       ", but the points say too little of the manifold: ",
-                       known_.against > 0 ? DescribeCauses(mesh_, known_)
-                                          : Message("most places do not look ", spec_.dimension,
-                                                    "-dimensional, see the warnings"),
-                       ".");
+                       ", but the points say too little of the manifold: ", WhatIsMissing(), ".");
       case CertificateLevel::kRefused:
         break;
     }

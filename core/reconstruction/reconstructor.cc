@@ -17,6 +17,7 @@
 #include "core/reconstruction/difference_tangents.h"
 #include "core/reconstruction/fitted_cloud.h"
 #include "core/reconstruction/judgement.h"
+#include "core/reconstruction/open_boundary.h"
 #include "core/specification.h"
 
 namespace stellate::core {
@@ -90,6 +91,7 @@ class Reconstructor {
     watch_.Advance(ReconstructionPhase::kBuilding, kFittedBy);
     Assemble();
     watch_.Advance(ReconstructionPhase::kCertifying, kAssembledBy);
+    if (!spec_.closed) TrimBoundary(cloud_, &assembly_);
     causes_ = FindCauses(cloud_, assembly_, !spec_.closed);
     TakeToRows();
     Count();
@@ -206,7 +208,15 @@ class Reconstructor {
     const bool by_differences = spec_.reach && spec_.noise == 0.0 && !known_.tangents_given;
     ReconstructionSpecification spec = spec_;
     if (by_differences) spec.reach.reset();
-    JudgeReconstruction(spec, ViewOf(tangents_), known_, &result_.report);
+    MeshView mesh = ViewOf(tangents_);
+    OpenBoundary boundary;
+    if (!spec_.closed) boundary = FindOpenBoundary(mesh);
+    if (!boundary.faces.empty()) {
+      mesh.walls = boundary.walls.data();
+      mesh.outward = boundary.outward.data();
+      mesh.faces = &boundary.faces;
+    }
+    JudgeReconstruction(spec, mesh, known_, &result_.report);
     if (by_differences) JudgeByDifferences();
   }
 

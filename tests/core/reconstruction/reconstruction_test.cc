@@ -244,6 +244,50 @@ TEST(Degenerate, FewestPoints) {
   EXPECT_FALSE(result->report.certificate.certified);
 }
 
+// ------------------------------------------------------------------ boundary
+
+// Points alone do not tell an end from a part that they are too few for: no such mesh is certified.
+TEST(Boundary, IsKeptWhereStarsAreOpen) {
+  const Sample sample = Draw(Of("half", 1000, true));  // of a torus: a cylinder
+  ReconstructionSpecification spec = SpecOf(2, 3);
+  spec.closed = false;
+  const auto result = Reconstruct(spec, {sample.points, {}});
+  ASSERT_TRUE(result) << result.error().message;
+  const Certificate& certificate = result->report.certificate;
+  const auto counted = Count(2, result->simplices, SizeOf(sample.points));
+  EXPECT_EQ(certificate.level, CertificateLevel::kDecided) << certificate.verdict;
+  EXPECT_FALSE(certificate.certified);
+  EXPECT_EQ(counted.bad_facets, counted.rim_facets) << certificate.verdict;
+  EXPECT_EQ(counted.euler, 0);
+  EXPECT_EQ(counted.components, 1);
+  EXPECT_EQ(certificate.euler_characteristic, 0);
+  EXPECT_EQ(certificate.boundary_components, 2u);
+  EXPECT_EQ(certificate.boundary_simplices, counted.rim_facets);
+}
+
+TEST(Boundary, OfACoarseSampleIsNotCertified) {
+  for (const std::uint32_t points : {25u, 40u, 70u, 120u}) {
+    const Sample sample = Draw(Of("torus", points, false));
+    ReconstructionSpecification spec = SpecOf(2, 3);
+    spec.closed = false;
+    const auto result = Reconstruct(spec, {sample.points, {}});
+    ASSERT_TRUE(result) << result.error().message;
+    EXPECT_FALSE(result->report.certificate.certified) << result->report.certificate.verdict;
+  }
+}
+
+TEST(Boundary, IsNoneWhereTheManifoldHasNone) {
+  const Sample sample = Draw(Of("torus", 1000, true));
+  ReconstructionSpecification spec = SpecOf(2, 3);
+  const auto closed = Reconstruct(spec, {sample.points, {}});
+  spec.closed = false;
+  const auto open = Reconstruct(spec, {sample.points, {}});
+  ASSERT_TRUE(open && closed);
+  EXPECT_EQ(open->simplices, closed->simplices);
+  EXPECT_TRUE(open->report.certificate.certified) << open->report.certificate.verdict;
+  EXPECT_EQ(open->report.certificate.boundary_simplices, 0u);
+}
+
 // ------------------------------------------------------------------ how it runs
 
 TEST(Run, IsTheSameForAnyNumberOfThreads) {
