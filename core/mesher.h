@@ -53,10 +53,11 @@ class Mesher {
   // The points of the current mesh, d x n, valid until Absorb.
   virtual Eigen::Map<const Eigen::MatrixXd> Points() const = 0;
   // Compute tangent bases, (d k) x n laid out as QueryBlock::bases, and simplices, k+1 ascending
-  // vertex ids each, in the order of their lowest vertex.
+  // vertex ids each, or k of the boundary alone, in the order of their lowest vertex.
   virtual Eigen::MatrixXd Tangents() const = 0;
   virtual std::vector<std::uint32_t> Simplices() const = 0;
-  // Compute the labels of these simplices, in their order; empty without labels.
+  // Compute the labels of these simplices, in their order, as many each as
+  // Specification::labels_per_simplex.
   virtual std::vector<std::int8_t> Labels() const = 0;
 };
 

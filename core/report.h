@@ -56,6 +56,11 @@ struct MeshDelta {
   std::vector<std::int8_t> labels;            // of each added simplex; empty without labels
 };
 
+// Of the boundary alone (Specification::boundary_only) simplices have k ids. Each has two labels:
+// those that the normal of its row of ids points away from and into, 0 being outside of M, 1 being
+// M without labels; where M does not fill space (k < d), those of its wall's positive and negative
+// side.
+
 struct Counts {
   std::uint64_t vertices = 0, simplices = 0;
   std::uint64_t rounds = 0;                 // batches asked, certificate included
@@ -77,6 +82,12 @@ struct FaceMesh {
   // Of a face of one wall: the labels on its negative and its positive side. Without labels, what
   // is beyond a wall has the label 0, and M the label 1.
   std::pair<int, int> sides = {0, 1};
+  // Of a face of one wall where the inside is not meshed (Specification::boundary_only), else
+  // empty. By simplex: the signs of the other walls; the label that the normal of its row of ids
+  // points away from; and the wall's outward conormals at its vertices, d each.
+  std::vector<WallSet> signs;
+  std::vector<std::int8_t> behind;
+  std::vector<double> conormals;
 };
 
 // A face in the certificate.
@@ -87,14 +98,21 @@ struct FaceReport {
   std::uint64_t components = 0;
   std::int64_t euler_characteristic = 0;
   std::pair<int, int> sides = {0, 1};  // as of FaceMesh
+  double volume = 0;                // length^dimension: an area, a length; of corners their number
+  std::vector<std::int64_t> betti;  // over Z/2, from dimension 0 on; empty: not computed
 };
 
-// A region of an arrangement of walls in the certificate: the part of M with one label.
+// A region of an arrangement of walls in the certificate: the part of M with one label. Of a
+// boundary alone (Specification::boundary_only) the region's surface, except the volume.
 struct RegionReport {
   int label = 0;
   std::uint64_t simplices = 0;
   std::uint64_t components = 0;
   std::int64_t euler_characteristic = 0;
+  double volume = 0;                // length^k; 0 of a boundary alone, if M does not fill space
+  double min_dihedral_degrees = 0;  // the least angle between facets of a simplex; of k = 1, 0
+  std::uint64_t pinched = 0;        // vertices where it touches itself, counted once for each touch
+  std::vector<std::int64_t> betti;  // over Z/2, from dimension 0 on; empty: not computed
 };
 
 // A place where two walls meet: a point of M, and the angle between the walls there, inside M.
@@ -178,6 +196,9 @@ struct Certificate {
   std::vector<RegionReport> regions;  // of an arrangement of walls, by label; else none
   // Of an arrangement: the vertices at which M, or a region, touches itself in an edge or a point.
   std::uint64_t pinched_vertices = 0;
+  // Of all of M, length^k, or of a boundary alone what it encloses; 0: see RegionReport. Regions
+  // add up to it. Set with walls alone.
+  double volume = 0;
   // The smallest angle of walls at all vertices on several walls; none: no walls meet. Set for
   // every ending of a run.
   std::optional<WallAngle> sharpest;

@@ -93,6 +93,25 @@ Status CheckClosures(const Specification& spec) {
   return Status::Ok();
 }
 
+Status CheckBoundaryOnly(const Specification& spec) {
+  if (spec.walls == 0)
+    return Invalid("boundary_only",
+                   "boundary_only is set without walls: a manifold without walls has no boundary");
+  if (spec.dimension < 2)
+    return Invalid("boundary_only",
+                   "boundary_only is set for a curve, whose boundary is points: leave it out");
+  if (!spec.closures.empty())
+    return Invalid(
+        "boundary_only",
+        "boundary_only is set together with closures: what lies between phases is meshed "
+        "with them alone; leave it out");
+  if (spec.components > 0)
+    return Invalid("components",
+                   "components is set together with boundary_only, which leaves unseen what the "
+                   "boundary belongs to: leave one of them out");
+  return Status::Ok();
+}
+
 Status CheckWalls(const Specification& spec) {
   if (spec.walls == 0 && !spec.labels.empty())
     return Invalid("labels", "labels are set without walls, whose sign vectors they are of");
@@ -317,6 +336,7 @@ Status CheckLimits(const Specification& spec) {
 Status Validate(const Specification& spec) {
   Status status = CheckDimensions(spec);
   if (status.ok()) status = CheckWalls(spec);
+  if (status.ok() && spec.boundary_only) status = CheckBoundaryOnly(spec);
   if (status.ok()) status = CheckEpsilon(spec.epsilon);
   if (status.ok() && spec.bounding_box) {
     status = CheckBox(*spec.bounding_box, spec.ambient_dimension);

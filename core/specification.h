@@ -117,6 +117,9 @@ struct Specification {
   // of three walls or more. Each wall of a set is zero wherever all others of it are. A face is
   // then queried with all walls that are zero there.
   std::vector<WallSet> closures;
+  // Mesh the boundary of M alone, and what is between regions, without the inside: the simplices
+  // have the dimension k - 1. Needs walls and k >= 2.
+  bool boundary_only = false;
   double epsilon = 0;  // rule R1: every R_p(sigma) <= epsilon; a length, > 0
   OracleCapabilities oracle;
   std::optional<BoundingBox> bounding_box;  // seeds are drawn from it when none are given
@@ -135,6 +138,10 @@ struct Specification {
   Audit audit = Audit::kStandard;
   Limits limits;
   int threads = 0;  // 0: all cores
+
+  int simplex_dimension() const { return dimension - (boundary_only ? 1 : 0); }
+  // How many labels each simplex has: none, that of its region, or those of both its sides.
+  int labels_per_simplex() const { return boundary_only ? 2 : labels.empty() ? 0 : 1; }
 };
 
 // Returns the seeds that cover the box, d x n: each point of the box is nearer than the declared

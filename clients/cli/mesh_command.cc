@@ -53,7 +53,8 @@ int MeshCommand::Run(std::stop_token stop) {
     return PrintError({ErrorCode::kRefused, "",
                        "--closest-point-only: a manifold with boundary takes tangent bases"});
   }
-  if (const auto ok = outputs_.Check(oracle.dimension(), oracle.ambient_dimension()); !ok) {
+  const int dimension = oracle.dimension() - (options_.boundary_only.value_or(false) ? 1 : 0);
+  if (const auto ok = outputs_.Check(dimension, oracle.ambient_dimension()); !ok) {
     return PrintError(ok.error());
   }
   Expected<Connection> connection = server_.Read();

@@ -16,6 +16,8 @@ constexpr MeshSetting kRun[] = {
     {"--box-seeds", &O::box_seeds, "points of the box tried as seeds"},
     {"--components", &O::components, "that the manifold has at least: fewer are not certified"},
     {"--reach", &O::reach, "declare a lower bound of the reach, to have the mesh proved"},
+    {"--boundary-only", &O::boundary_only,
+     "mesh the boundary of a solid alone, without the inside: simplices of one dimension less"},
     {"--cover-box", &O::cover_box, "miss no component in the bounding box; needs --reach"},
 };
 

@@ -19,8 +19,10 @@
 #include "core/certificate/evidence/undeclared_boundary_check.h"
 
 namespace stellate::core {
+namespace {
 
-// The order of queries. The constructor decides what needs no oracle; then come rounds:
+// The certificate of all of M. The order of queries. The constructor decides what needs no oracle;
+// then come rounds:
 //   1. points inside simplices, vertices, coverage probes, small steps that compare given tangent
 //      spaces with closest points, and the first step of the balls;
 //   2. tangents at the probes' closest points, by differences, if the oracle sends none; the second
@@ -28,10 +30,10 @@ namespace stellate::core {
 //      ones went wrong;
 //   3. in a thorough audit, balls at the barycentres' closest points as well.
 // All answers, and those that were known before, are then compared with the mesh.
-class Certifier::Impl {
+class WholeRounds final : public CertifierRounds {
  public:
-  Impl(const Specification& spec, const MeshView& mesh, const StarFacts& facts,
-       KnownOfManifold known)
+  WholeRounds(const Specification& spec, const MeshView& mesh, const StarFacts& facts,
+              KnownOfManifold known)
       : x_(spec, mesh, facts) {
     x_.seen = std::move(known.points);
     ends_ = std::move(known.ends);
@@ -46,9 +48,11 @@ class Certifier::Impl {
     }
   }
 
-  const std::vector<QueryBlock>* NextBlocks() const { return finished_ ? nullptr : &blocks_; }
+  const std::vector<QueryBlock>* NextBlocks() const override {
+    return finished_ ? nullptr : &blocks_;
+  }
 
-  void Absorb(const std::vector<AnswerBlock>& answers) {
+  void Absorb(const std::vector<AnswerBlock>& answers) override {
     if (finished_) return;
     // They measure the oracle's own error, which all other judgements need.
     if (ball_steps_ == 0) claims_->closeness.JudgeVertices(answers[vertices_]);
@@ -60,10 +64,10 @@ class Certifier::Impl {
     AskMore();
   }
 
-  const Certificate& certificate() const { return x_.certificate; }
-  const std::vector<double>& wanted() const { return x_.wanted; }
-  const PointsOnWalls& wanted_on_walls() const { return x_.wanted_on_walls; }
-  KnownOfManifold TakeKnown() {
+  const Certificate& certificate() const override { return x_.certificate; }
+  const std::vector<double>& wanted() const override { return x_.wanted; }
+  const PointsOnWalls& wanted_on_walls() const override { return x_.wanted_on_walls; }
+  KnownOfManifold TakeKnown() override {
     return {std::move(x_.seen), {}, std::move(ends_), std::move(clear_)};
   }
 
@@ -243,16 +247,22 @@ class Certifier::Impl {
   std::size_t vertices_ = 0;   // their block in the first round
 };
 
+}  // namespace
+
 Certifier::Certifier(const Specification& spec, const MeshView& mesh, const StarFacts& facts,
-                     KnownOfManifold known)
-    : impl_(std::make_unique<Impl>(spec, mesh, facts, std::move(known))) {}
+                     KnownOfManifold known) {
+  if (spec.boundary_only)
+    rounds_ = RoundsForBoundary(spec, mesh, facts, std::move(known));
+  else
+    rounds_ = std::make_unique<WholeRounds>(spec, mesh, facts, std::move(known));
+}
 Certifier::~Certifier() = default;
 
-const std::vector<QueryBlock>* Certifier::NextBlocks() { return impl_->NextBlocks(); }
-void Certifier::Absorb(const std::vector<AnswerBlock>& answers) { impl_->Absorb(answers); }
-const Certificate& Certifier::certificate() const { return impl_->certificate(); }
-const std::vector<double>& Certifier::Uncovered() const { return impl_->wanted(); }
-const PointsOnWalls& Certifier::UncoveredOnWalls() const { return impl_->wanted_on_walls(); }
-KnownOfManifold Certifier::TakeKnown() { return impl_->TakeKnown(); }
+const std::vector<QueryBlock>* Certifier::NextBlocks() { return rounds_->NextBlocks(); }
+void Certifier::Absorb(const std::vector<AnswerBlock>& answers) { rounds_->Absorb(answers); }
+const Certificate& Certifier::certificate() const { return rounds_->certificate(); }
+const std::vector<double>& Certifier::Uncovered() const { return rounds_->wanted(); }
+const PointsOnWalls& Certifier::UncoveredOnWalls() const { return rounds_->wanted_on_walls(); }
+KnownOfManifold Certifier::TakeKnown() { return rounds_->TakeKnown(); }
 
 }  // namespace stellate::core

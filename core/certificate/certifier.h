@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/batch.h"
+#include "core/certificate/certifier_rounds.h"
 #include "core/certificate/mesh_view.h"
 #include "core/report.h"
 #include "core/specification.h"
@@ -39,8 +40,7 @@ class Certifier {
   KnownOfManifold TakeKnown();
 
  private:
-  class Impl;
-  std::unique_ptr<Impl> impl_;
+  std::unique_ptr<CertifierRounds> rounds_;
 };
 
 }  // namespace stellate::core

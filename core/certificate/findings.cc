@@ -92,8 +92,9 @@ std::string DescribeBoundary(const Certificate& certificate) {
   return text + faces + ")";
 }
 
-// ", in 2 regions (label 1: 1 component of Euler characteristic 2; ...)"
-std::string DescribeRegions(const Certificate& certificate) {
+// ", in 2 regions (label 1: 1 component of Euler characteristic 2; ...)"; `where`: "in", or
+// "around", if it is their surfaces.
+std::string DescribeRegions(const Certificate& certificate, const char* where) {
   if (certificate.regions.empty()) return {};
   const auto counted = [](std::uint64_t n, const char* what) {
     return Message(n, " ", what, n == 1 ? "" : "s");
@@ -103,7 +104,26 @@ std::string DescribeRegions(const Certificate& certificate) {
     regions += Message(regions.empty() ? "" : "; ", "label ", region.label, ": ",
                        counted(region.components, "component"), " of Euler characteristic ",
                        region.euler_characteristic);
-  return Message(", in ", counted(certificate.regions.size(), "region"), " (", regions, ")");
+  return Message(", ", where, " ", counted(certificate.regions.size(), "region"), " (", regions,
+                 ")");
+}
+
+// The verdict on a boundary without its inside.
+std::string CertifiedBoundary(int k, const Certificate& certificate) {
+  const bool has_regions = !certificate.regions.empty();
+  return Message(
+      "Certified: the boundary of ", has_regions ? "the regions" : "a domain", " of dimension ", k,
+      ", without the inside: ", certificate.components,
+      certificate.components == 1 ? " component" : " components", " of dimension ", k - 1,
+      " and Euler characteristic ", certificate.euler_characteristic,
+      DescribeRegions(certificate, "around"), DescribeBoundary(certificate),
+      ". Decided on the whole mesh: ", has_regions ? "the surface of each region" : "it",
+      " is closed, the links of its vertices are spheres, and neighbours agree about what is "
+      "outside. Sampled: barycentres lie near their walls, and all of ",
+      certificate.answers_checked,
+      " points known of the walls lie on the mesh, which faces as the walls do there. Not looked "
+      "at: what is inside, and whether parts of the boundary that are far apart along it meet in "
+      "space. Pieces of walls that no question came near cannot be excluded.");
 }
 
 std::string DescribeManifold(int k, bool has_boundary, const Certificate& certificate) {
@@ -112,7 +132,7 @@ std::string DescribeManifold(int k, bool has_boundary, const Certificate& certif
                  certificate.orientable ? "orientable" : "non-orientable",
                  " manifold of dimension ", k, " with ", components,
                  components == 1 ? " component" : " components", " and Euler characteristic ",
-                 certificate.euler_characteristic, DescribeRegions(certificate),
+                 certificate.euler_characteristic, DescribeRegions(certificate, "in"),
                  has_boundary ? DescribeBoundary(certificate) : "");
 }
 
@@ -130,6 +150,10 @@ void Findings::Conclude(int k, const Specification& spec, Certificate& certifica
           " Nothing that was seen contradicts the mesh: it may be right, and is too coarse to "
           "certify.";
     if (spec.walls == 0 && MayBeBoundary()) certificate.verdict += Message(" ", kDeclareWalls, ".");
+    return;
+  }
+  if (spec.boundary_only) {
+    certificate.verdict = CertifiedBoundary(k, certificate);
     return;
   }
   const std::uint64_t components = certificate.components;

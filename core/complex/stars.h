@@ -87,6 +87,8 @@ class Stars {
   // Returns the sample, including the points that wait for Commit; all others have stars.
   const Sample<K>& sample() const { return sample_; }
   std::uint32_t size() const { return sample_.size(); }
+  // Whether a point's star is built: it does not wait for Commit.
+  bool has_star(std::uint32_t id) const { return id < cells_.size(); }
   CentreRule centre_rule() const { return options_.centre_rule; }
   // `sector`: of the point's sectors.
   const Cell& cell(std::uint32_t id, int sector = 0) const {

@@ -23,15 +23,22 @@ class BoundaryState {
   // Corners nearer to each other than this, in epsilon, are one.
   static constexpr double kSameCorner = 1e-6;
 
-  explicit BoundaryState(int walls, Closures closures = {})
-      : has_walls_(walls > 0), closures_(std::move(closures)), stage_(walls > 0 ? 0 : K) {}
+  // boundary_only  the last stage is that of the boundary, K - 1
+  explicit BoundaryState(int walls, Closures closures = {}, bool boundary_only = false)
+      : has_walls_(walls > 0),
+        closures_(std::move(closures)),
+        last_stage_(boundary_only ? K - 1 : K),
+        stage_(walls > 0 ? 0 : K) {}
 
   bool has_walls() const { return has_walls_; }
 
   // The dimension of the faces that are being meshed. Without walls there is one stage, K.
   int stage() const { return stage_; }
+  // Whether the inside is never meshed.
+  bool leaves_inside() const { return last_stage_ < K; }
+  bool is_last_stage() const { return stage_ == last_stage_; }
   // Goes to the next stage. Returns false after the last.
-  bool Advance() { return stage_ < K && ++stage_ <= K; }
+  bool Advance() { return stage_ < last_stage_ && ++stage_ <= last_stage_; }
   // Faces of dimension up to this could not be refined to the end. Rules skip them from now on, so
   // that the rest of M is meshed nevertheless. 0: none.
   int left() const { return left_; }
@@ -105,7 +112,7 @@ class BoundaryState {
  private:
   bool has_walls_;
   Closures closures_;
-  int stage_, left_ = 0;
+  int last_stage_, stage_, left_ = 0;
   std::optional<std::size_t> most_while_split_;
   std::vector<Seed> seeds_, discoveries_;
   std::vector<Split> splits_;

@@ -51,7 +51,7 @@ Engine<K>::Engine(const Specification& spec, const ResolvedCriteria& criteria)
       stars_(spec.ambient_dimension, criteria.epsilon, {criteria.inradius, criteria.centre_rule},
              LabelTable(spec.labels, Closures(spec.closures))),
       sizes_(criteria),
-      boundary_(spec.walls, Closures(spec.closures)) {
+      boundary_(spec.walls, Closures(spec.closures), spec.boundary_only) {
   // Sizes are estimated from whole stars.
   if (boundary_.has_walls() && !sizes_.is_estimated()) stars_.RestrictToBoundary();
 }

@@ -41,7 +41,7 @@ std::vector<FaceMesh> FacesOf(const Stars<K>& stars) {
     std::sort(simplices.begin(), simplices.end());
     simplices.erase(std::unique(simplices.begin(), simplices.end()), simplices.end());
     const auto& [dimension, walls, sides] = key;
-    FaceMesh face{walls, dimension, {}, sides};
+    FaceMesh face{walls, dimension, {}, sides, {}, {}, {}};
     for (const Simplex& s : simplices)
       face.simplices.insert(face.simplices.end(), s.begin(), s.begin() + dimension + 1);
     all.push_back(std::move(face));

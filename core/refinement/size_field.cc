@@ -9,6 +9,7 @@
 #include "core/base/parallel.h"
 #include "core/base/vector_ops.h"
 #include "core/geometry/reach_bound.h"
+#include "core/refinement/boundary_mesh.h"
 
 namespace stellate::core {
 namespace {
@@ -156,7 +157,7 @@ double SizeField<K>::BoundAt(const Stars<K>& stars, std::uint32_t p) const {
 }
 
 template <int K>
-double SizeField<K>::MaxRadiusOverSize(const Stars<K>& stars) {
+double SizeField<K>::MaxRadiusOverSize(const Stars<K>& stars, bool boundary_only) {
   if (is_given_) {
     std::vector<std::uint32_t> all(stars.size());
     std::iota(all.begin(), all.end(), 0u);
@@ -166,7 +167,8 @@ double SizeField<K>::MaxRadiusOverSize(const Stars<K>& stars) {
   double most = 0;
   for (std::uint32_t p = 0; p < stars.size(); ++p) {
     CheckInterruption(p);
-    most = std::max(most, std::sqrt(stars.cell(p).max_norm2()) / Estimate(stars, p));
+    const double norm2 = boundary_only ? MaxBoundaryNorm2<K>(stars, p) : stars.cell(p).max_norm2();
+    most = std::max(most, std::sqrt(norm2) / Estimate(stars, p));
   }
   return most;
 }

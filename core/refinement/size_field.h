@@ -48,7 +48,7 @@ class SizeField {
 
   // The largest ratio of a star's circumradius to the local feature size estimated there, even
   // where the client gives sizes, since those need not be local feature sizes.
-  double MaxRadiusOverSize(const Stars<K>& stars);
+  double MaxRadiusOverSize(const Stars<K>& stars, bool boundary_only = false);
   // Counts vertices whose given size asks for a bound below the finest.
   std::uint64_t CountTooFine() const;
 

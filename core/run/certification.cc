@@ -8,6 +8,7 @@
 #include "core/base/interruption.h"
 #include "core/base/parallel.h"
 #include "core/complex/consistency.h"
+#include "core/refinement/boundary_mesh.h"
 #include "core/refinement/faces.h"
 
 namespace stellate::core {
@@ -62,19 +63,22 @@ StarFacts FactsOf(Engine<K>& engine) {
   StarFacts facts;
   facts.converged = true;
   const bool agreed = engine.filled().is_handed_out();
+  const bool leaves_inside = engine.boundary().leaves_inside();
+  const bool has_labels = !stars.sample().sectors().labels().empty();
   std::vector<double> parts(ChunkCount(stars.size()), 0);
   ParallelChunks(stars.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
     double most = 0;
     for (auto p = static_cast<std::uint32_t>(begin); p < end; ++p)
-      most =
-          std::max(most, agreed                                       ? MaxAgreedNorm2<K>(stars, p)
-                         : !stars.sample().sectors().labels().empty() ? MaxLiveNorm2<K>(stars, p)
-                                                                      : stars.cell(p).max_norm2());
+      most = std::max(most, leaves_inside ? MaxBoundaryNorm2<K>(stars, p)
+                            : agreed      ? MaxAgreedNorm2<K>(stars, p)
+                            : has_labels  ? MaxLiveNorm2<K>(stars, p)
+                                          : stars.cell(p).max_norm2());
     parts[chunk] = most;
   });
   for (const double norm2 : parts)
     facts.max_circumradius = std::max(facts.max_circumradius, std::sqrt(norm2));
-  if (engine.criteria().graded()) facts.max_size_ratio = engine.sizes().MaxRadiusOverSize(stars);
+  if (engine.criteria().graded())
+    facts.max_size_ratio = engine.sizes().MaxRadiusOverSize(stars, leaves_inside);
   return facts;
 }
 
@@ -88,6 +92,31 @@ Certification::Certification(const Specification& spec, MeshView mesh,
 std::vector<QueryBlock> Certification::Questions() {
   const std::vector<QueryBlock>* blocks = certifier_.NextBlocks();
   return blocks ? *blocks : std::vector<QueryBlock>();
+}
+
+// Adds to the faces of one wall what the simplices that end there would tell.
+template <int K>
+void AddWhatIsKnown(const Stars<K>& stars, std::vector<FaceMesh>* faces) {
+  const std::vector<BoundarySimplex<K>> known = BoundarySimplices<K>(stars);
+  const auto stride = static_cast<std::size_t>(K) * static_cast<std::size_t>(stars.sample().d());
+  for (FaceMesh& face : *faces) {
+    if (face.dimension != K - 1) continue;
+    const std::size_t count = face.simplices.size() / K;
+    face.signs.resize(count);
+    face.behind.resize(count);
+    face.conormals.resize(count * stride);
+    ParallelFor(count, [&](std::size_t s) {
+      BoundarySimplex<K> simplex;
+      std::copy_n(face.simplices.begin() + static_cast<std::ptrdiff_t>(s * K), K,
+                  simplex.ids.begin());
+      const auto at = std::lower_bound(known.begin(), known.end(), simplex,
+                                       [](const auto& a, const auto& b) { return a.ids < b.ids; });
+      if (at == known.end() || at->ids != simplex.ids) return;  // it has a vertex off the wall
+      face.signs[s] = at->signs;
+      face.behind[s] = at->behind;
+      ConormalsAt<K>(stars.sample(), *at, face.conormals.data() + s * stride);
+    });
+  }
 }
 
 template <int K>
@@ -119,6 +148,7 @@ BoundaryOfMesh BoundaryOf(const Engine<K>& engine) {
     }
   }
   boundary.faces = FacesOf<K>(engine.stars());
+  if (engine.boundary().leaves_inside()) AddWhatIsKnown<K>(stars, &boundary.faces);
   for (std::uint32_t p = 0; stars.sample().has_protecting_balls() && p < stars.size(); ++p)
     boundary.balls.push_back(stars.sample().ProtectingRadius2(p));
   return boundary;

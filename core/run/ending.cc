@@ -39,6 +39,10 @@ template <int K>
 void DescribeUnfinished(const Engine<K>& engine, double epsilon, bool is_smooth,
                         Certificate* certificate) {
   const Stars<K>& stars = engine.stars();
+  if (engine.boundary().leaves_inside()) {  // no star is closed
+    certificate->inconsistent_simplices = engine.violations().inconsistent();
+    return;
+  }
   const std::uint32_t count = std::min(stars.size(), engine.violations().star_count());
   double reach = std::numeric_limits<double>::infinity();
   std::uint32_t narrowest = 0;

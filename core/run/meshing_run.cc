@@ -94,6 +94,7 @@ Expected<MeshDelta> MeshingRun<K>::Absorb(const Answers& answers) {
       parts_->Take(answers);
     }
     if (progress_.round >= spec_.limits.max_rounds) scheduler_.Finish(Termination::kRoundBudget);
+    if (spec_.boundary_only && complete) boundary_.Update(scheduler_.engine().stars(), &delta);
     Update();
   };
   if (!WithThreads(spec_.threads, interruption_, advance)) {
@@ -103,16 +104,23 @@ Expected<MeshDelta> MeshingRun<K>::Absorb(const Answers& answers) {
     report_ = report_before;
     return Refuse(StatusCode::kCancelled, "the computation was interrupted");
   }
-  auto change = scheduler_.TakeChange();
-  delta.added = std::move(change.added);
-  delta.removed = std::move(change.removed);
+  AddChange(&delta);
   const Stars<K>& stars = scheduler_.engine().stars();
-  delta.labels = stars.LabelsOf(delta.added);
   delta.points = Points().rightCols(stars.size() - static_cast<Eigen::Index>(delta.first_vertex));
   if (spec_.walls > 0)
     for (auto v = static_cast<std::uint32_t>(delta.first_vertex); v < stars.size(); ++v)
       delta.walls.push_back(stars.sample().walls(v));
   return delta;
+}
+
+// Moves the round's simplices into its delta.
+template <int K>
+void MeshingRun<K>::AddChange(MeshDelta* delta) {
+  auto change = scheduler_.TakeChange();
+  if (spec_.boundary_only) return;
+  delta->added = std::move(change.added);
+  delta->removed = std::move(change.removed);
+  delta->labels = scheduler_.engine().stars().LabelsOf(delta->added);
 }
 
 template <int K>
@@ -129,7 +137,11 @@ void MeshingRun<K>::Update() {
   const bool is_whole = !interruption_.raised();
   if (is_whole) report_.counts = scheduler_.counts();
   const std::optional<Outcome>& outcome = scheduler_.outcome();
-  if (!outcome) return scheduler_.Measure(&progress_);
+  if (!outcome) {
+    scheduler_.Measure(&progress_);
+    if (spec_.boundary_only) progress_.simplices = boundary_.size();
+    return;
+  }
   parts_.reset();
   batch_.reset();
   report_.termination = outcome->termination;
@@ -140,7 +152,7 @@ void MeshingRun<K>::Update() {
     const Engine<K>& engine = scheduler_.engine();
     progress_.is_foreseeable = false;
     progress_.vertices = engine.stars().size();
-    progress_.simplices = engine.simplex_count();
+    progress_.simplices = spec_.boundary_only ? boundary_.size() : engine.simplex_count();
     progress_.bad_sliver = engine.violations().slivers();
     progress_.bad_inconsistent = engine.violations().inconsistent();
     if (report_.termination == Termination::kConverged) progress_.fraction = 1;

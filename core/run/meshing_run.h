@@ -9,6 +9,7 @@
 #include "core/base/instantiate.h"
 #include "core/base/interruption.h"
 #include "core/mesher.h"
+#include "core/refinement/boundary_mesh.h"
 #include "core/run/batch_parts.h"
 #include "core/run/scheduler.h"
 
@@ -34,9 +35,12 @@ class MeshingRun final : public Mesher {
   Eigen::MatrixXd Tangents() const override {
     return scheduler_.engine().stars().sample().TangentMatrix();
   }
-  std::vector<std::uint32_t> Simplices() const override { return scheduler_.engine().Simplices(); }
+  std::vector<std::uint32_t> Simplices() const override {
+    return spec_.boundary_only ? boundary_.Simplices() : scheduler_.engine().Simplices();
+  }
   std::vector<std::int8_t> Labels() const override {
-    return scheduler_.engine().stars().LabelsOf(Simplices());
+    return spec_.boundary_only ? boundary_.Labels()
+                               : scheduler_.engine().stars().LabelsOf(Simplices());
   }
 
  private:
@@ -46,12 +50,14 @@ class MeshingRun final : public Mesher {
   void Count(const QueryBatch& asked);
   void Finish(Termination termination, Status failure);
   void Update();
+  void AddChange(MeshDelta* delta);
 
   const Specification spec_;
   Interruption interruption_;
   Scheduler<K> scheduler_;
   std::shared_ptr<QueryBatch> batch_;  // of the open round; null: there is none
   std::optional<BatchParts> parts_;    // of batch_, if that is too large for one batch
+  BoundaryMesh<K> boundary_;           // what is handed out of the boundary alone
   Progress progress_;
   Report report_;
 };

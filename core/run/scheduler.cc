@@ -210,7 +210,7 @@ void Scheduler<K>::Plan() {
 
 template <int K>
 void Scheduler<K>::Certify() {
-  if (AskForSpares(spare_points_.Uncovered(engine_.stars()))) return;
+  if (!spec_.boundary_only && AskForSpares(spare_points_.Uncovered(engine_.stars()))) return;
   const Stars<K>& stars = engine_.stars();
   if (stars.size() == 0 && !noted_.inside.empty())  // the discoveries led nowhere
     return Fail({StatusCode::kNoSeeds, noted_.inside});

@@ -79,6 +79,8 @@ void BoundaryToProto(const core::Certificate& c, v1::Certificate* out) {
     one->set_simplices(face.simplices);
     one->set_components(face.components);
     one->set_euler_characteristic(face.euler_characteristic);
+    one->set_volume(face.volume);
+    one->mutable_betti()->Add(face.betti.begin(), face.betti.end());
     if (c.regions.empty() || core::CountWalls(face.walls) != 1) continue;
     one->set_label_below(static_cast<std::uint32_t>(face.sides.first));
     one->set_label_above(static_cast<std::uint32_t>(face.sides.second));
@@ -89,8 +91,13 @@ void BoundaryToProto(const core::Certificate& c, v1::Certificate* out) {
     one->set_simplices(region.simplices);
     one->set_components(region.components);
     one->set_euler_characteristic(region.euler_characteristic);
+    one->set_volume(region.volume);
+    one->set_min_dihedral_degrees(region.min_dihedral_degrees);
+    one->set_pinched(region.pinched);
+    one->mutable_betti()->Add(region.betti.begin(), region.betti.end());
   }
   out->set_pinched_vertices(c.pinched_vertices);
+  out->set_volume(c.volume);
   if (!c.sharpest) return;
   add_walls(c.sharpest->walls, out->mutable_sharpest());
   out->mutable_sharpest()->set_degrees(c.sharpest->degrees);
@@ -264,7 +271,7 @@ void ToProto(const Session& session, v1::Mesh* out) {
   ToProto(view, out->mutable_progress());
   if (view.report) {
     v1::Report* const report = out->mutable_report();
-    ToProto(*view.report, request.spec.dimension, report);
+    ToProto(*view.report, request.spec.simplex_dimension(), report);
     report->mutable_certificate()->set_verdict(
         VerdictOf(request, view.report->certificate.verdict));
     report->set_elapsed_seconds(view.elapsed_seconds);

@@ -106,6 +106,7 @@ void AddTopology(const v1::Certificate& c, Entries* entries) {
                                           c.links_decided_exactly() ? "exactly)" : "by homology)")
                                 : Grouped(c.bad_links()) + " links are not spheres";
   entries->Add("manifold", Message(closed, "; ", links));
+  if (c.certified() && c.fibre_samples() == 0) return;  // of a boundary alone none is looked at
   entries->Add("stars", Message(Grouped(c.inconsistent_simplices()), " inconsistent simplices, ",
                                 Grouped(c.unembedded_stars()), " stars overlap, ",
                                 Grouped(c.fibre_failures()), " of ", Grouped(c.fibre_samples()),
@@ -166,6 +167,35 @@ void AddRefinement(const v1::Counts& n, Entries* entries) {
                                        Grouped(n.inserted_inconsistent())));
 }
 
+// ", Betti numbers 1 0 0 0"
+std::string BettiNumbers(const google::protobuf::RepeatedField<std::int64_t>& betti) {
+  std::string numbers;
+  for (const std::int64_t number : betti) numbers += ' ' + std::to_string(number);
+  return numbers.empty() ? ", Betti numbers not computed" : ", Betti numbers" + numbers;
+}
+
+// A line for each region and each interface.
+void AddRegions(const v1::Certificate& c, Entries* entries) {
+  for (const v1::RegionCertificate& region : c.regions()) {
+    std::string words =
+        Message("label ", region.label(), ": ", Grouped(region.simplices()), " simplices, volume ",
+                Digits(region.volume(), 6), BettiNumbers(region.betti()));
+    if (region.min_dihedral_degrees() > 0)
+      words +=
+          Message(", angles from ", Digits(region.min_dihedral_degrees(), 1, true), " degrees on");
+    if (region.pinched() > 0)
+      words += Message("; it touches itself at ", Grouped(region.pinched()), " vertices");
+    entries->Add("region", words);
+  }
+  for (const v1::FaceCertificate& face : c.faces()) {
+    if (!face.has_label_below()) continue;
+    entries->Add("interface",
+                 Message("wall ", face.walls(0), ", between ", face.label_below(), " and ",
+                         face.label_above(), ": ", Grouped(face.simplices()), " simplices, area ",
+                         Digits(face.volume(), 6), BettiNumbers(face.betti())));
+  }
+}
+
 }  // namespace
 
 std::string ReportText(const v1::Report& report) {
@@ -192,6 +222,7 @@ std::string ReportText(const v1::Report& report) {
   if (c.components() > 0) {
     AddTopology(c, &entries);
     AddMeasures(c, &entries);
+    AddRegions(c, &entries);
   }
   for (const std::string& warning : c.warnings()) entries.Add("warning", warning);
   return entries.Take();

@@ -275,6 +275,7 @@ Allowed<MeshRequest> ReadSpec(const v1::MeshSpec& spec, const Config& config) {
   Refused status = ToInt(spec.walls(), "walls", &request.spec.walls);
   request.spec.labels.assign(spec.labels().begin(), spec.labels().end());
   if (status.ok()) status = ReadClosures(spec, &request.spec);
+  request.spec.boundary_only = spec.boundary_only();
   if (status.ok()) status = ReadDimensions(spec, config, &request.spec);
   if (status.ok()) status = ReadPlace(spec, &request.spec);
   if (status.ok()) status = ReadAudit(spec, &request.spec);
@@ -315,6 +316,7 @@ void ToProto(const core::Specification& spec, v1::MeshSpec* out) {
     core::ForEachWall(closure,
                       [&](int wall) { walls->add_walls(static_cast<std::uint32_t>(wall)); });
   }
+  out->set_boundary_only(spec.boundary_only);
   if (spec.bounding_box) {
     const auto d = static_cast<std::size_t>(spec.bounding_box->lower.size());
     v1::BoundingBox* const box = out->mutable_bounding_box();

@@ -56,14 +56,15 @@ void Set(std::vector<std::uint8_t>* bits, std::size_t i) {
 
 }  // namespace
 
-MeshHistory::MeshHistory(int dimension, int ambient_dimension)
+MeshHistory::MeshHistory(int dimension, int ambient_dimension, int labels)
     : row_size_(static_cast<std::size_t>(dimension) + 1),
       d_(ambient_dimension),
+      label_count_(static_cast<std::size_t>(labels)),
       points_(d_),
       smoothed_(d_),
       rows_(row_size_),
       lives_(1),
-      labels_(1),
+      labels_(label_count_),
       deaths_(1),
       marks_(1),
       next_(1) {}
@@ -139,7 +140,7 @@ Status MeshHistory::Append(const core::MeshDelta& delta, const PointPlaces& plac
       if (delta.walls[v] != 0) boundary_.push_back({last.vertices + v, delta.walls[v]});
     rows_.Append(delta.added.data(), new_simplices);
     lives_.Append(births.data(), new_simplices);
-    labels_.Append(delta.labels.data(), delta.labels.size());
+    labels_.Append(delta.labels.data(), delta.labels.size() / label_count_);
     if (!places.codes.empty()) places_ = places.codes;
     smoothed_.Append(places.smoothed.data(), smoothed);
     marks_.push_back({last.vertices + new_vertices, first_simplex + new_simplices, deaths_.size()});
@@ -169,16 +170,26 @@ std::vector<std::uint32_t> MeshHistory::SortLiving() const {
   return living;
 }
 
-void MeshHistory::Orient() {
-  const std::vector<std::uint32_t> living = SortLiving();
+// Of the boundary of what fills space, labels tell: out of the larger one.
+core::Orientation MeshHistory::OrientationOf(const std::vector<std::uint32_t>& living) const {
+  if (label_count_ == 2 && row_size_ == d_) {
+    core::Orientation orientation{true, std::vector<std::uint8_t>(BytesOfBits(living.size()), 0)};
+    for (std::size_t i = 0; i < living.size(); ++i)
+      if (labels_[living[i]][0] < labels_[living[i]][1]) Set(&orientation.turned, i);
+    return orientation;
+  }
   std::vector<std::uint32_t> rows(living.size() * row_size_);
   core::ParallelFor(living.size(), [&](std::size_t i) {
     std::copy_n(rows_[living[i]], row_size_, rows.data() + i * row_size_);
   });
-  core::Orientation orientation =
-      core::Orient(static_cast<int>(row_size_) - 1, static_cast<int>(d_),
-                   static_cast<std::uint32_t>(points_.size()), rows,
-                   [this](std::uint32_t v) { return points_[v]; });
+  return core::Orient(static_cast<int>(row_size_) - 1, static_cast<int>(d_),
+                      static_cast<std::uint32_t>(points_.size()), rows,
+                      [this](std::uint32_t v) { return points_[v]; });
+}
+
+void MeshHistory::Orient() {
+  const std::vector<std::uint32_t> living = SortLiving();
+  core::Orientation orientation = OrientationOf(living);
   std::vector<std::uint8_t> by_row;
   if (orientation.orientable) by_row.assign(BytesOfBits(rows_.size()), 0);
   for (std::size_t i = 0; i < living.size() && orientation.orientable; ++i) {
@@ -267,20 +278,20 @@ bool MeshHistory::ReadPlaces(const Source& read) {
 }
 
 bool MeshHistory::WriteLabels(const Sink& write) const {
-  return labels_.size() == 0 || WriteRows(labels_, 1, write);
+  return labels_.size() == 0 || WriteRows(labels_, label_count_, write);
 }
 
 bool MeshHistory::ReadLabels(const Source& read) {
-  std::int8_t first = 0;
+  std::vector<std::int8_t> first(label_count_);
   const std::uint64_t simplices = marks_.back().simplices;
-  if (simplices == 0 || !read(&first, sizeof(first))) return true;
-  labels_.Append(&first, 1);
-  return ReadInto(&labels_, 1, simplices - 1, read);
+  if (simplices == 0 || !read(first.data(), first.size())) return true;
+  labels_.Append(first.data(), 1);
+  return ReadInto(&labels_, label_count_, simplices - 1, read);
 }
 
 core::Expected<std::unique_ptr<MeshHistory>> MeshHistory::Read(int dimension, int ambient_dimension,
-                                                               const Source& read) {
-  auto history = std::make_unique<MeshHistory>(dimension, ambient_dimension);
+                                                               const Source& read, int labels) {
+  auto history = std::make_unique<MeshHistory>(dimension, ambient_dimension, labels);
   history->complete_ = true;
   if (!history->ReadRows(read) || !history->ComputeLives()) {
     return tl::unexpected(OutOfStep("these are not the bytes of a mesh's history"));
@@ -450,7 +461,9 @@ void MeshHistory::AppendAdded(Cursor* cursor, std::size_t end, std::size_t max_r
     ++rows;
     const std::uint32_t* const row = rows_[cursor->added];
     part->added.insert(part->added.end(), row, row + row_size_);
-    if (labels_.size() > 0) part->labels.push_back(*labels_[cursor->added]);
+    if (labels_.size() > 0)
+      part->labels.insert(part->labels.end(), labels_[cursor->added],
+                          labels_[cursor->added] + label_count_);
     if (!has_bits) continue;
     std::vector<std::uint8_t>& turned = part->orientation->turned;
     turned.resize(BytesOfBits(rows));

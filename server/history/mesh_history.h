@@ -102,7 +102,9 @@ struct DeltaPart {
 // One thread appends; any threads read. Readers wait at most while one round is copied in.
 class MeshHistory {
  public:
-  MeshHistory(int dimension, int ambient_dimension);
+  // dimension  of the simplices
+  // labels     how many each simplex has, if any: 1, or 2 of the boundary alone
+  MeshHistory(int dimension, int ambient_dimension, int labels = 1);
 
   // Adds a revision; the last of a reconstruction has places. kFailedPrecondition, and no change,
   // if it is not the next one, vertex ids leave a gap, a removed simplex does not exist, or places
@@ -124,7 +126,7 @@ class MeshHistory {
   // result cannot be appended to. kFailedPrecondition: the bytes are not a history.
   using Source = std::function<bool(void* data, std::size_t bytes)>;
   static core::Expected<std::unique_ptr<MeshHistory>> Read(int dimension, int ambient_dimension,
-                                                           const Source& read);
+                                                           const Source& read, int labels = 1);
 
   std::uint64_t revision() const;
   std::uint64_t MemoryBytes() const;  // that it occupies
@@ -167,6 +169,7 @@ class MeshHistory {
   bool WriteOrientation(const Sink& write) const;
   bool ReadOrientation(const Source& read);
   std::vector<std::uint32_t> SortLiving() const;
+  core::Orientation OrientationOf(const std::vector<std::uint32_t>& living) const;
   bool WriteLabels(const Sink& write) const;
   bool ReadLabels(const Source& read);
   bool WritePlaces(const Sink& write) const;
@@ -177,8 +180,9 @@ class MeshHistory {
   void Link(std::uint32_t simplex);
   void AppendAdded(Cursor* cursor, std::size_t end, std::size_t max_rows, DeltaPart* part) const;
 
-  const std::size_t row_size_;  // k + 1
+  const std::size_t row_size_;  // the simplices' dimension, and one
   const std::size_t d_;
+  const std::size_t label_count_;  // of a simplex
 
   mutable std::mutex mutex_;
   GrowingRows<double> points_;
@@ -192,7 +196,7 @@ class MeshHistory {
   GrowingRows<double> smoothed_;
   GrowingRows<std::uint32_t> rows_;    // ids of every simplex so far
   GrowingRows<Life> lives_;            // by simplex
-  GrowingRows<std::int8_t> labels_;    // by simplex, of an arrangement of walls; else empty
+  GrowingRows<std::int8_t> labels_;    // by simplex, where it has any; else empty
   GrowingRows<std::uint32_t> deaths_;  // simplices in the order of their removal
   struct Mark {
     std::uint64_t vertices = 0, simplices = 0, deaths = 0;

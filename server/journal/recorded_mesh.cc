@@ -45,6 +45,8 @@ void RecordedMesh::SetShape(const MeshRequest& request) {
   shape_.dimension = request.spec.dimension;
   shape_.ambient_dimension = request.spec.ambient_dimension;
   shape_.walls = request.spec.walls;
+  shape_.simplex_dimension = request.spec.simplex_dimension();
+  shape_.labels = std::max(request.spec.labels_per_simplex(), 1);
 }
 
 // Writes of about `bytes`, unless the mesh is not wanted any more.
@@ -350,7 +352,7 @@ core::Expected<std::unique_ptr<MeshHistory>> RecordedMesh::ReadHistory() {
     }
     return true;
   };
-  return MeshHistory::Read(shape_.dimension, shape_.ambient_dimension, read);
+  return MeshHistory::Read(shape_.simplex_dimension, shape_.ambient_dimension, read, shape_.labels);
 }
 
 void RecordedMesh::RemoveRounds() { journal_->RemoveLater(shared_from_this()); }

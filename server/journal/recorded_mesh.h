@@ -66,7 +66,7 @@ class RecordedMesh final : public SessionJournal,
   const std::uint64_t owner_limit_;
   std::string owner_;
   struct {
-    int dimension = 0, ambient_dimension = 0, walls = 0;
+    int dimension = 0, ambient_dimension = 0, walls = 0, simplex_dimension = 0, labels = 1;
   } shape_;
   std::atomic<bool> forgotten_{false};
 

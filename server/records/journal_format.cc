@@ -53,6 +53,7 @@ void LayOutSpecification(Archive& archive, Value& spec) {
   archive.Number(spec.walls);
   archive.Bytes(spec.labels);
   archive.Ids(spec.closures);
+  archive.Number(spec.boundary_only);
   archive.Number(spec.oracle.conormals);
 }
 

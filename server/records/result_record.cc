@@ -89,6 +89,8 @@ void LayOutBoundary(Archive& archive, Value& certificate) {
     archive.Number(face.euler_characteristic);
     archive.Number(face.sides.first);
     archive.Number(face.sides.second);
+    archive.Number(face.volume);
+    archive.Ids(face.betti);
   }
   count = certificate.regions.size();
   archive.Number(count);
@@ -100,8 +102,13 @@ void LayOutBoundary(Archive& archive, Value& certificate) {
     archive.Number(region.simplices);
     archive.Number(region.components);
     archive.Number(region.euler_characteristic);
+    archive.Number(region.volume);
+    archive.Number(region.min_dihedral_degrees);
+    archive.Number(region.pinched);
+    archive.Ids(region.betti);
   }
   archive.Number(certificate.pinched_vertices);
+  archive.Number(certificate.volume);
 }
 
 template <typename Archive, typename Value>

@@ -49,7 +49,7 @@ class DownloadStream final
     if (!cursor_) return Step::kWait;
     const core::Specification& spec = session().request().spec;
     const DeltaPart part = history()->Next(&*cursor_, PartBytes());
-    ToProto(part, spec.dimension, spec.ambient_dimension, response());
+    ToProto(part, spec.simplex_dimension(), spec.ambient_dimension, response());
     response()->set_vertices(snapshot_.vertices);
     response()->set_simplices(snapshot_.simplices);
     response()->set_next_position(cursor_->Position());

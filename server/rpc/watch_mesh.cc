@@ -68,7 +68,7 @@ class WatchStream final : public HistoryStream<v1::WatchMeshRequest, v1::WatchMe
   void TakePart() {
     const core::Specification& spec = session().request().spec;
     const DeltaPart part = history()->Next(&*cursor_, PartBytes());
-    ToProto(part, spec.dimension, spec.ambient_dimension, response()->mutable_delta());
+    ToProto(part, spec.simplex_dimension(), spec.ambient_dimension, response()->mutable_delta());
     if (!part.complete) return;
     at_ = cursor_->to;
     cursor_.reset();

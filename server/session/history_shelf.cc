@@ -11,7 +11,8 @@ namespace stellate::server {
 HistoryShelf::HistoryShelf(const SessionOptions& options) : options_(options) {
   if (!options_.record || !options_.record->result) {
     const core::Specification& spec = options_.request.spec;
-    loaded_ = std::make_shared<MeshHistory>(spec.dimension, spec.ambient_dimension);
+    loaded_ = std::make_shared<MeshHistory>(spec.simplex_dimension(), spec.ambient_dimension,
+                                            std::max(spec.labels_per_simplex(), 1));
     return;
   }
   const SessionResult& result = *options_.record->result;

@@ -85,6 +85,13 @@ std::string ViolationsJson(const Violations& v) {
   return json.Take();
 }
 
+std::string NumbersJson(const std::vector<std::int64_t>& numbers) {
+  std::string text;
+  for (const std::int64_t number : numbers)
+    text += (text.empty() ? "" : ", ") + std::to_string(number);
+  return "[" + text + "]";
+}
+
 std::string LabelJson(const std::optional<std::uint32_t>& label) {
   return label ? std::to_string(*label) : "null";
 }
@@ -100,6 +107,8 @@ std::string FacesJson(const std::vector<FaceCertificate>& faces) {
     json.Raw("euler_characteristic", std::to_string(face.euler_characteristic));
     json.Raw("label_below", LabelJson(face.label_below));
     json.Raw("label_above", LabelJson(face.label_above));
+    json.Add("volume", face.volume);
+    json.Raw("betti", NumbersJson(face.betti));
     text += (text.empty() ? "" : ", ") + json.Take();
   }
   return "[" + text + "]";
@@ -113,6 +122,10 @@ std::string RegionsJson(const std::vector<RegionCertificate>& regions) {
     json.Add("simplices", region.simplices);
     json.Add("components", region.components);
     json.Raw("euler_characteristic", std::to_string(region.euler_characteristic));
+    json.Add("volume", region.volume);
+    json.Add("min_dihedral_degrees", region.min_dihedral_degrees);
+    json.Add("pinched", region.pinched);
+    json.Raw("betti", NumbersJson(region.betti));
     text += (text.empty() ? "" : ", ") + json.Take();
   }
   return "[" + text + "]";
@@ -172,6 +185,7 @@ std::string CertificateJson(const Certificate& c) {
   json.Raw("sharpest", SharpestJson(c.sharpest));
   json.Raw("regions", RegionsJson(c.regions));
   json.Add("pinched_vertices", c.pinched_vertices);
+  json.Add("volume", c.volume);
   json.Add("only_too_coarse", c.only_too_coarse);
   return json.Take();
 }

@@ -254,13 +254,15 @@ Expected<void> DeltaMesh::Apply(const v1::MeshDelta& delta, const char* turned) 
   const Expected<Eigen::Index> added = CountRows(delta.added(), width);
   if (!added) return tl::unexpected(added.error());
   const std::string& labels = delta.added_labels();
-  if (!labels.empty() && labels.size() != static_cast<size_t>(*added)) {
+  // Of the boundary alone those of both sides, which the orientation says as well.
+  const bool of_sides = labels.size() == 2 * static_cast<size_t>(*added);
+  if (!labels.empty() && !of_sides && labels.size() != static_cast<size_t>(*added)) {
     return tl::unexpected(BrokenProtocol("labels that do not fit their simplices"));
   }
   if (!simplex_set_->Remove(delta.removed().data().data(), *removed)) {
     return tl::unexpected(BrokenProtocol("the removal of a simplex that is not there"));
   }
-  const SimplexSet::Marks marks{turned, labels.empty() ? nullptr : labels.data()};
+  const SimplexSet::Marks marks{turned, labels.empty() || of_sides ? nullptr : labels.data()};
   if (!simplex_set_->Add(delta.added().data().data(), *added, vertices(), marks)) {
     return tl::unexpected(BrokenProtocol("a simplex with a vertex that it never sent"));
   }

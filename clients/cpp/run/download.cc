@@ -38,7 +38,7 @@ class Download {
   Expected<Mesh> Go() {
     const std::stop_callback cancel(options_.stop, [this] { attempts_.Stop(); });
     if (auto ok = Look(); !ok) return tl::unexpected(ok.error());
-    const auto k = static_cast<int>(status_.spec().dimension());
+    const int k = SimplexDimension(status_.spec());
     const auto d = static_cast<int>(status_.spec().ambient_dimension());
     if (options_.on_found) {
       if (auto ok = options_.on_found(k, d); !ok) return tl::unexpected(ok.error());

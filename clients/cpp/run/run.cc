@@ -88,7 +88,8 @@ Expected<Mesh> Run::Go() {
 }
 
 Expected<void> Run::Create() {
-  auto builder = DeltaMesh::Create(oracle_.dimension(), oracle_.ambient_dimension());
+  const int k = oracle_.dimension() - (options_.boundary_only.value_or(false) ? 1 : 0);
+  auto builder = DeltaMesh::Create(k, oracle_.ambient_dimension());
   if (!builder) return tl::unexpected(builder.error());
   builder_ = std::make_unique<DeltaMesh>(std::move(*builder));
   Expected<std::string> name = CreateMesh(*stub_, oracle_, options_);

@@ -178,6 +178,7 @@ Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
   if (options.thorough_audit) spec.set_audit(v1::AUDIT_THOROUGH);
   if (options.reach) spec.set_declared_reach(*options.reach);
   if (options.cover_box) spec.set_cover_box(*options.cover_box);
+  if (options.boundary_only) spec.set_boundary_only(*options.boundary_only);
   spec.set_random_seed(options.random_seed);
   spec.set_label(options.label);
   return spec;
@@ -292,15 +293,24 @@ Report ReportOf(const v1::Mesh& mesh) {
                          face.components(),
                          face.euler_characteristic(),
                          LabelOf(face.has_label_below(), face.label_below()),
-                         LabelOf(face.has_label_above(), face.label_above())});
+                         LabelOf(face.has_label_above(), face.label_above()),
+                         face.volume(),
+                         {face.betti().begin(), face.betti().end()}});
   if (c.has_sharpest()) {
     const v1::WallAngle& s = c.sharpest();
     out.sharpest = WallAngle{
         {s.walls().begin(), s.walls().end()}, s.degrees(), {s.point().begin(), s.point().end()}};
   }
   for (const v1::RegionCertificate& region : c.regions())
-    out.regions.push_back(
-        {region.label(), region.simplices(), region.components(), region.euler_characteristic()});
+    out.regions.push_back({region.label(),
+                           region.simplices(),
+                           region.components(),
+                           region.euler_characteristic(),
+                           region.volume(),
+                           region.min_dihedral_degrees(),
+                           region.pinched(),
+                           {region.betti().begin(), region.betti().end()}});
+  out.volume = c.volume();
   out.pinched_vertices = c.pinched_vertices();
   out.only_too_coarse = c.only_too_coarse();
   return r;
@@ -316,7 +326,7 @@ MeshStatus StatusOf(const v1::Mesh& m) {
   mesh.label = m.spec().label();
   mesh.owner = m.owner();
   mesh.state = FromProto(m.state());
-  mesh.dimension = static_cast<int>(m.spec().dimension());
+  mesh.dimension = SimplexDimension(m.spec());
   mesh.ambient_dimension = static_cast<int>(m.spec().ambient_dimension());
   mesh.epsilon = m.spec().epsilon();
   mesh.progress = FromProto(m.progress());

@@ -32,6 +32,11 @@ Expected<void> CheckServable(const Oracle& oracle, std::optional<std::uint32_t> 
 // Errors: an option that the wire cannot carry (the server checks the rest).
 Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options);
 
+// Returns the dimension of a mesh's simplices.
+inline int SimplexDimension(const v1::MeshSpec& spec) {
+  return static_cast<int>(spec.dimension()) - (spec.boundary_only() ? 1 : 0);
+}
+
 Progress FromProto(const v1::Progress& message);
 Report ReportOf(const v1::Mesh& mesh);
 MeshState FromProto(v1::MeshState state);

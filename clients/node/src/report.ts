@@ -75,7 +75,7 @@ export function infoFrom(mesh: Mesh__Output): MeshInfo {
     name: mesh.name,
     state: enumName(mesh.state, "MESH_STATE_"),
     label: mesh.spec?.label ?? "",
-    dimension: mesh.spec?.dimension ?? 0,
+    dimension: (mesh.spec?.dimension ?? 0) - (mesh.spec?.boundaryOnly ? 1 : 0),
     ambientDimension: mesh.spec?.ambientDimension ?? 0,
     epsilon: mesh.spec?.epsilon ?? 0,
     over: mesh.endTime != null,

@@ -120,7 +120,8 @@ def mesh(
     files = [save] if isinstance(save, (str, os.PathLike)) else list(save)
     checked = CheckedOracle(oracle)
     for file in files:
-        check_save(file, checked.dimension, checked.ambient_dimension)
+        dimension = checked.dimension - bool(options.get("boundary_only"))
+        check_save(file, dimension, checked.ambient_dimension)
     with contextlib.ExitStack() as stack:
         interrupts = stack.enter_context(Interrupts())
         if on_progress is None and somebody_looks_on(sys.stderr):

@@ -57,6 +57,7 @@ _RUN = {
     "--busy": "busy_seconds",
     "--components": "components",
     "--reach": "reach",
+    "--boundary-only": "boundary_only",
     "--cover-box": "cover_box",
     "--audit": "audit",
 }

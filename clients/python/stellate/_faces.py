@@ -41,6 +41,20 @@ def faces(
         return ()
     rows = facets_in_one(simplices) if labels is None else facets_of_regions(simplices, labels)
     bits = np.bitwise_and.reduce(walls[rows], axis=1)
+    return _by_walls(rows, bits, walls, dimension)
+
+
+def creases(simplices: np.ndarray, walls: np.ndarray | None, dimension: int) -> tuple[Face, ...]:
+    """The faces of a boundary without its inside, by walls: its simplices, and where walls meet."""
+    if walls is None or not 0 <= dimension < simplices.shape[1] or not len(simplices):
+        return ()
+    bits = np.bitwise_and.reduce(walls[simplices], axis=1)
+    return _by_walls(simplices, bits, walls, dimension)
+
+
+def _by_walls(
+    rows: np.ndarray, bits: np.ndarray, walls: np.ndarray, dimension: int
+) -> tuple[Face, ...]:
     while rows.shape[1] - 1 > dimension and len(rows):
         rows, bits = _ridges(rows, walls)
     return tuple(

@@ -22,7 +22,7 @@ class MeshInfo:
     # "WAITING", "RUNNING", "SUCCEEDED", "STOPPED", "CANCELLED", "FAILED"; "UNKNOWN": a newer one
     state: str
     label: str
-    dimension: int
+    dimension: int  # of its simplices
     ambient_dimension: int
     epsilon: float
     create_time: datetime.datetime | None
@@ -53,7 +53,7 @@ class MeshInfo:
             name=mesh.name,
             state=enums.state(mesh.state),
             label=mesh.spec.label,
-            dimension=mesh.spec.dimension,
+            dimension=mesh.spec.dimension - mesh.spec.boundary_only,
             ambient_dimension=mesh.spec.ambient_dimension,
             epsilon=mesh.spec.epsilon,
             create_time=at("create_time"),

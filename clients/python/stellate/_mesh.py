@@ -39,6 +39,8 @@ class Mesh:
         bit i; else None.
       orientation: how the simplices are oriented, as the server says of a mesh that is over; else None.
       labels: of an arrangement of walls, (m,) int8: the region that each simplex is in; else None.
+        Of the boundary alone (boundary_only=True), (m, 2): the labels that the normal of each row's own
+        order points away from and into, 0 being outside; a solid without labels has the label 1.
       places: of a finished reconstruction, (n,) str: what became of each point, "OK", "MERGED", ... (see
         stellate.reconstruct); else None.
       smoothed: of a reconstruction from noisy points, (n, d): the positions that the complex was built on
@@ -57,16 +59,33 @@ class Mesh:
     smoothed: np.ndarray | None = None
 
     def region(self, label: int) -> Mesh:
-        """The part with one label, of the same points. Its boundary is where it ends or meets others."""
+        """The part with one label, of the same points. Its boundary is where it ends or meets others.
+
+        Of the boundary alone: the closed surface of that region, its normals outwards.
+        """
         if self.labels is None or not (self.labels == label).any():
             have = () if self.labels is None else np.unique(self.labels).tolist()
             raise ValueError(f"the mesh has no region {label!r}; it has {list(have)}")
+        if self.is_boundary:
+            on = (self.labels == label).any(axis=1)
+            sides = self.labels[on]
+            alone = np.where(sides == label, sides, 0)  # what else is there is outside of it
+            rows, revision = self.simplices[on], self.revision
+            return Mesh(self.points, rows, None, None, revision, self.walls, labels=alone)
         rows = self.simplices[self.labels == label]
         return Mesh(self.points, rows, None, None, self.revision, self.walls)
 
     @property
+    def is_boundary(self) -> bool:
+        """Whether this is a boundary without its inside: stellate.mesh(..., boundary_only=True)."""
+        return self.labels is not None and self.labels.ndim == 2
+
+    @property
     def boundary(self) -> tuple[Face, ...]:
-        """The boundary's parts, one for each wall: simplices of dimension k - 1."""
+        """The boundary's parts, one for each wall: simplices of dimension k - 1. Of the boundary alone
+        all of it, wall by wall, what is between regions too."""
+        if self.is_boundary:
+            return self.faces(self.dimension)
         return _faces.faces(self.simplices, self.walls, self.dimension - 1)
 
     @property
@@ -77,11 +96,14 @@ class Mesh:
     @property
     def corners(self) -> tuple[Face, ...]:
         """Where as many walls meet as the mesh has dimensions, or more: points."""
-        return tuple(face for face in self.faces(0) if len(face.walls) >= self.dimension)
+        least = self.dimension + self.is_boundary
+        return tuple(face for face in self.faces(0) if len(face.walls) >= least)
 
     def faces(self, dimension: int) -> tuple[Face, ...]:
         """The faces of a dimension below k, of a manifold with boundary, by ascending walls; those
-        between regions, too."""
+        between regions, too. The boundary alone has faces of its own dimension as well."""
+        if self.is_boundary:
+            return _faces.creases(self.simplices, self.walls, dimension)
         return _faces.faces(self.simplices, self.walls, dimension, self.labels)
 
     @property
@@ -103,8 +125,9 @@ class Mesh:
         """The simplices with vertices exchanged so that neighbours agree; None if not orientable.
 
         A hypersurface (k = d - 1) gets its normals outwards, component by component; simplices that
-        fill space (k = d) positive volumes. The server says so of a mesh that is over; others are
-        oriented here.
+        fill space (k = d) positive volumes. The boundary alone of a solid has its normals from the larger
+        of its two labels into the smaller one: outwards. The server says so of a mesh that is over;
+        others are oriented here.
         """
         if self.orientation is not None:
             if not self.orientation.orientable:
@@ -113,6 +136,12 @@ class Mesh:
             rows = np.flatnonzero(self.orientation.flags(len(told)))
             told[rows, -2:] = told[rows][:, [-1, -2]]
             return told
+        sides = self.labels
+        if sides is not None and self.is_boundary and self.dimension == self.ambient_dimension - 1:
+            outwards = self.simplices.copy()
+            rows = np.flatnonzero(sides[:, 0] < sides[:, 1])
+            outwards[rows, -2:] = outwards[rows][:, [-1, -2]]
+            return outwards
         turned = orient(self.simplices)
         if turned is None:
             return None

@@ -106,6 +106,11 @@ class SpecOptions(TypedDict, total=False):
     box_seeds: Annotated[
         Optional[int], "random points of the box that are tried as seeds; default 100"
     ]
+    boundary_only: Annotated[
+        Optional[bool],
+        "mesh the boundary of a solid alone, and what is between regions, without the inside: "
+        "simplices of one dimension less; default: off",
+    ]
     seeds: Annotated[
         Union[np.ndarray, Sequence[Any], None],
         "(m, d) points near the manifold; default: the oracle's seeds",

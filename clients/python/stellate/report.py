@@ -126,22 +126,38 @@ class FaceCertificate:
     # Of a wall of an arrangement: the labels where it is negative and where it is positive.
     label_below: int | None = None
     label_above: int | None = None
+    volume: float = 0.0  # an area, a length; of corners their number
+    betti: tuple[int, ...] = ()  # over Z/2, from dimension 0 on; empty: not computed
 
     @classmethod
     def from_fields(cls, fields: dict[str, Any]) -> FaceCertificate:
         """Back from dataclasses.asdict(face), or from JSON of it."""
         plain: dict[str, Any] = {**fields, "walls": tuple(fields["walls"])}
+        plain["betti"] = tuple(plain.get("betti", ()))
         return cls(**plain)
 
 
 @dataclasses.dataclass(frozen=True)
 class RegionCertificate:
-    """A region of an arrangement of walls: the part of the mesh with one label."""
+    """A region of an arrangement of walls: the part of the mesh with one label.
+
+    Of the boundary alone the region's surface, except the volume.
+    """
 
     label: int
     simplices: int
     components: int
     euler_characteristic: int
+    volume: float = 0.0  # 0 of the boundary alone of what does not fill space
+    min_dihedral_degrees: float = 0.0  # the least angle between two facets of a simplex
+    pinched: int = 0  # vertices where it touches itself, counted once for each touch
+    betti: tuple[int, ...] = ()  # over Z/2, from dimension 0 on; empty: not computed
+
+    @classmethod
+    def from_fields(cls, fields: dict[str, Any]) -> RegionCertificate:
+        """Back from dataclasses.asdict(region), or from JSON of it."""
+        plain: dict[str, Any] = {**fields, "betti": tuple(fields.get("betti", ()))}
+        return cls(**plain)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -201,6 +217,8 @@ class Certificate:
     sharpest: WallAngle | None = None  # where walls meet at the smallest angle, if any meet
     regions: tuple[RegionCertificate, ...] = ()  # of an arrangement of walls, by label
     pinched_vertices: int = 0  # where a region touches itself in an edge or a point alone
+    # With walls, of all of M, to which regions add up; of the boundary alone what it encloses.
+    volume: float = 0.0
     only_too_coarse: bool = False  # refused for its size alone: nothing seen contradicts it
 
 
@@ -309,7 +327,7 @@ class Report:
             faces = map(FaceCertificate.from_fields, certificate["faces"])
             certificate["faces"] = tuple(faces)
         regions = certificate.get("regions", ())  # checkpoints of earlier versions lack it
-        certificate["regions"] = tuple(RegionCertificate(**region) for region in regions)
+        certificate["regions"] = tuple(map(RegionCertificate.from_fields, regions))
         if certificate.get("sharpest"):
             certificate["sharpest"] = WallAngle.from_fields(certificate["sharpest"])
         told = dict(fields.get("reconstruction") or {})  # checkpoints of earlier versions lack it
@@ -393,11 +411,22 @@ def _certificate(message: pb.Certificate) -> Certificate:
             f.euler_characteristic,
             f.label_below if f.HasField("label_below") else None,
             f.label_above if f.HasField("label_above") else None,
+            f.volume,
+            tuple(f.betti),
         )
         for f in message.faces
     )
     regions = tuple(
-        RegionCertificate(r.label, r.simplices, r.components, r.euler_characteristic)
+        RegionCertificate(
+            r.label,
+            r.simplices,
+            r.components,
+            r.euler_characteristic,
+            r.volume,
+            r.min_dihedral_degrees,
+            r.pinched,
+            tuple(r.betti),
+        )
         for r in message.regions
     )
     s = message.sharpest

@@ -6,6 +6,7 @@ import {
   Phase,
   type Certificate,
   type Mesh,
+  type MeshSpec,
   type WorkerStats,
 } from "./generated/stellate/v1/mesh_pb";
 import type { Claim, WorkerRow, FaultKind, MeshRow, PastRow, Verdict } from "./messages";
@@ -21,6 +22,11 @@ export function isOver(mesh: Mesh): boolean {
   return kOver.has(mesh.state);
 }
 
+// Of the boundary alone simplices have a dimension less.
+export function simplexDimension(spec: MeshSpec): number {
+  return spec.dimension - (spec.boundaryOnly ? 1 : 0);
+}
+
 export function rowOf(mesh: Mesh): MeshRow {
   const progress = mesh.progress;
   return {
@@ -28,7 +34,7 @@ export function rowOf(mesh: Mesh): MeshRow {
     label: mesh.spec?.label ?? "",
     state: MeshState[mesh.state].toLowerCase(),
     over: isOver(mesh),
-    k: mesh.spec?.dimension ?? 0,
+    k: mesh.spec ? simplexDimension(mesh.spec) : 0,
     d: mesh.spec?.ambientDimension ?? 0,
     epsilon: mesh.spec?.epsilon ?? 0,
     vertices: Number(progress?.vertices ?? 0),
@@ -81,7 +87,7 @@ export function workersOf(mesh: Mesh): WorkerRow[] {
 // The ids at fault, by kind, and how many make one fault.
 export function faultsOf(mesh: Mesh): Map<FaultKind, { ids: Uint32Array; width: number }> {
   const violations = mesh.report?.certificate?.violations;
-  const k = mesh.spec?.dimension ?? 1;
+  const k = mesh.spec ? simplexDimension(mesh.spec) : 1;
   return new Map([
     ["faces", { ids: indices(violations?.faces), width: k }],
     ["links", { ids: indices(violations?.links), width: 1 }],
@@ -111,8 +117,8 @@ function claimsOf(mesh: Mesh, c: Certificate): Claim[] {
     });
   };
   const number = (title: string, text: string) => claims.push({ title, text, holds: null });
-  const k = mesh.spec?.dimension ?? 0;
-  const ends = (mesh.spec?.walls ?? 0) > 0;
+  const k = mesh.spec ? simplexDimension(mesh.spec) : 0;
+  const ends = (mesh.spec?.walls ?? 0) > 0 && !mesh.spec?.boundaryOnly;
   const face = ["", "vertex", "edge", "triangle"][k] ?? `${k - 1}-face`;
   check(
     "Closed",

@@ -19,7 +19,7 @@ import { report, send as say, sleep } from "./say";
 import { bareOf, extent, project, shapeOf } from "./shape";
 import type { Source } from "./source";
 import { MeshStore } from "./store";
-import { workersOf, faultsOf, isOver, pastOf, rowOf, verdictOf } from "./verdict";
+import { workersOf, faultsOf, isOver, pastOf, rowOf, simplexDimension, verdictOf } from "./verdict";
 
 const kLookSeconds = 1;
 const kDrawSeconds = 0.1; // ten frames a second while it grows
@@ -98,7 +98,7 @@ export class Viewing {
   private hear(mesh: Mesh) {
     if (this.stop.signal.aborted) return;
     if (this.store === null) {
-      this.store = new MeshStore(mesh.spec!.dimension, mesh.spec!.ambientDimension);
+      this.store = new MeshStore(simplexDimension(mesh.spec!), mesh.spec!.ambientDimension);
     }
     const ended = mesh.endTime !== undefined;
     this.mesh = mesh;

@@ -1,16 +1,21 @@
 #include "core/certificate/claims/boundary_claims.h"
 
+#include <Eigen/LU>
 #include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstdint>
 #include <string>
 #include <vector>
 
+#include "core/base/interruption.h"
 #include "core/base/message.h"
 #include "core/base/random.h"
+#include "core/certificate/complex/betti.h"
 #include "core/certificate/complex/links.h"
 #include "core/certificate/evidence/fibres.h"
+#include "core/certificate/measure/together.h"
 #include "core/geometry/reach_bound.h"
 
 namespace stellate::core {
@@ -26,7 +31,7 @@ std::string NameWalls(WallSet walls) {
 
 }  // namespace
 
-void BoundaryClaims::JudgeFaces(const ClosedOff& closed) {
+void BoundaryClaims::ReportFaces() {
   Certificate& c = x_.certificate;
   const int k = x_.mesh.k;
   std::vector<std::uint32_t> boundary;
@@ -39,6 +44,9 @@ void BoundaryClaims::JudgeFaces(const ClosedOff& closed) {
     report.simplices = face.simplices.size() / (static_cast<std::size_t>(face.dimension) + 1);
     report.components = shape.components;
     report.euler_characteristic = shape.euler_characteristic;
+    report.volume = MeasureTogether(x_.mesh, face.dimension, face.simplices).volume;
+    report.betti = BettiNumbers(face.dimension, static_cast<std::int64_t>(shape.components),
+                                shape.euler_characteristic, face.simplices);
     c.faces.push_back(report);
     if (face.dimension == k - 1 && IsEnd(face))
       boundary.insert(boundary.end(), face.simplices.begin(), face.simplices.end());
@@ -47,8 +55,13 @@ void BoundaryClaims::JudgeFaces(const ClosedOff& closed) {
   const Shape whole = ShapeOf(k - 1, boundary);
   c.boundary_components = whole.components;
   c.boundary_euler_characteristic = whole.euler_characteristic;
-  c.euler_characteristic += closed.EulerOfRest(k);
-  if (boundary.empty() || k < 3) return;  // circles and points have no links
+}
+
+void BoundaryClaims::JudgeFaces(const ClosedOff& closed) {
+  const int k = x_.mesh.k;
+  ReportFaces();
+  x_.certificate.euler_characteristic += closed.EulerOfRest(k);
+  if (x_.certificate.boundary_simplices == 0 || k < 3) return;  // circles and points have no links
   const std::vector<std::uint32_t> parts = closed.Boundary(k);
   const Adjacency adjacency(SimplexList{k - 1, closed.apex, &parts});
   const LinkReport links = CheckLinks(adjacency);
@@ -59,6 +72,45 @@ void BoundaryClaims::JudgeFaces(const ClosedOff& closed) {
   if (links.bad_links > 0)
     x_.findings.Refuse(Findings::kLinks, Message("in the boundary ", links.first_bad_link,
                                                  "; vertices like it: ", links.bad_links));
+}
+
+void BoundaryClaims::JudgeVolume() {
+  Certificate& c = x_.certificate;
+  const auto k = static_cast<std::size_t>(x_.mesh.k);
+  c.volume = MeasureTogether(x_.mesh, x_.mesh.k, *x_.mesh.simplices).volume;
+  if (x_.mesh.d != x_.mesh.k) return;
+  using Facet = std::array<std::uint32_t, kMaxDimension>;
+  std::vector<Facet> ends;
+  for (const FaceMesh& face : *x_.mesh.faces)
+    if (face.dimension == x_.mesh.k - 1 && IsEnd(face))
+      for (std::size_t f = 0; f < face.simplices.size(); f += k)
+        std::copy_n(face.simplices.begin() + static_cast<std::ptrdiff_t>(f), k,
+                    ends.emplace_back().begin());
+  std::sort(ends.begin(), ends.end());
+  std::vector<std::uint32_t> boundary;
+  std::vector<bool> turned;
+  for (std::uint32_t s = 0; s < x_.list().size(); ++s) {
+    CheckInterruption(s);
+    const std::uint32_t* const ids = x_.list()[s];
+    if (!x_.AtBoundary(ids)) continue;
+    Eigen::MatrixXd edges(x_.mesh.d, x_.mesh.d);
+    for (int i = 0; i < x_.mesh.d; ++i) edges.col(i) = x_.Vertex(ids[i + 1]) - x_.Vertex(ids[0]);
+    const bool is_negative = edges.determinant() < 0;
+    for (std::size_t out = 0; out <= k; ++out) {
+      Facet facet{};
+      for (std::size_t i = 0, n = 0; i <= k; ++i)
+        if (i != out) facet[n++] = ids[i];
+      if (!std::binary_search(ends.begin(), ends.end(), facet)) continue;
+      boundary.insert(boundary.end(), facet.begin(), facet.begin() + x_.mesh.k);
+      turned.push_back(is_negative != (out % 2 == 1));
+    }
+  }
+  const double enclosed = EnclosedVolume(x_.mesh, boundary, turned);
+  if (!AreSameVolumes(enclosed, c.volume))
+    x_.findings.Refuse(Findings::kComplex,
+                       Message("its simplices have the volume ", Brief(c.volume),
+                               " together, and its boundary encloses ", Brief(enclosed),
+                               ": some of them overlap"));
 }
 
 std::vector<QueryBlock> BoundaryClaims::FaceQuestions() {
@@ -100,6 +152,9 @@ void BoundaryClaims::JudgeFace(std::size_t block, const Eigen::MatrixXd& asked,
     const double bound = x_.DistanceAllowed(diameter);
     const double distance =
         Found(answer, j) ? (answer.points.col(j) - asked.col(j)).norm() : INFINITY;
+    if (x_.spec.boundary_only)
+      x_.certificate.max_barycentre_distance =
+          std::max(x_.certificate.max_barycentre_distance, distance);
     if (x_.spec.criteria.max_deviation && distance > *x_.spec.criteria.max_deviation)
       x_.findings.Refuse(
           Findings::kDeviation,

@@ -16,9 +16,14 @@ class BoundaryClaims {
  public:
   explicit BoundaryClaims(Examination& examination) : x_(examination) {}
 
-  // Fills the certificate's report of each face, and checks that the boundary itself is a closed
-  // manifold. `closed`: all of M, closed off.
+  // Fills the certificate's report of each face, and of the boundary.
+  void ReportFaces();
+  // The same, and checks that the boundary itself is a closed manifold. `closed`: all of M,
+  // closed off.
   void JudgeFaces(const ClosedOff& closed);
+
+  // Measures M, and checks that its simplices fill what its boundary encloses.
+  void JudgeVolume();
 
   // Returns barycentres of some simplices of the boundary, a block for each wall. JudgeFace takes
   // the answers to one block.

@@ -11,48 +11,18 @@
 
 #include "core/base/interruption.h"
 #include "core/base/message.h"
+#include "core/certificate/complex/parts.h"
 
 namespace stellate::core {
 namespace {
 
 using Ids = std::vector<std::uint32_t>;
 
-// Sets that are joined step by step.
-class Parts {
- public:
-  explicit Parts(std::size_t count) : parent_(count) {
-    std::iota(parent_.begin(), parent_.end(), std::size_t{0});
-  }
-  std::size_t Root(std::size_t i) {
-    while (parent_[i] != i) i = parent_[i] = parent_[parent_[i]];
-    return i;
-  }
-  void Join(std::size_t i, std::size_t j) { parent_[Root(j)] = Root(i); }
-  std::size_t Count() {
-    std::size_t count = 0;
-    for (std::size_t i = 0; i < parent_.size(); ++i) count += parent_[i] == i;
-    return count;
-  }
-
- private:
-  std::vector<std::size_t> parent_;
-};
-
-// Counts the parts that the walls' signs leave of a region, or of M, at a vertex: sectors that
-// share a wall are in one.
+// Counts the parts that the walls' signs leave of a region, or of M, at a vertex.
 std::size_t PartsAt(const MeshView& mesh, std::uint32_t v, int label) {
   if (CountWalls(mesh.WallsOf(v)) < 2) return 1;
-  std::vector<WallSet> sectors = mesh.table->Sectors(mesh.WallsOf(v), mesh.signs[v]);
-  if (mesh.corner_sectors)
-    if (const auto at = mesh.corner_sectors->find(v); at != mesh.corner_sectors->end())
-      sectors = at->second;
-  if (label != 0)
-    std::erase_if(sectors, [&](WallSet sector) { return mesh.table->Of(sector) != label; });
-  Parts parts(sectors.size());
-  for (std::size_t i = 0; i < sectors.size(); ++i)
-    for (std::size_t j = 0; j < i; ++j)
-      if (CountWalls(sectors[i] ^ sectors[j]) == 1) parts.Join(i, j);
-  return std::max<std::size_t>(parts.Count(), 1);
+  const std::vector<std::size_t> roots = PartsOfSectors(SectorsAt(mesh, v, label));
+  return std::max<std::size_t>(std::set<std::size_t>(roots.begin(), roots.end()).size(), 1);
 }
 
 Ids Without(const std::uint32_t* ids, std::size_t width, std::uint32_t left_out) {
@@ -200,6 +170,33 @@ std::int64_t CountFaces(std::size_t width, const Ids& simplices, int size) {
 }
 
 }  // namespace
+
+std::vector<WallSet> SectorsOf(const LabelTable& table, WallSet walls, WallSet signs, int label) {
+  std::vector<WallSet> sectors = table.Sectors(walls, signs);
+  if (label != 0) std::erase_if(sectors, [&](WallSet sector) { return table.Of(sector) != label; });
+  return sectors;
+}
+
+std::vector<WallSet> SectorsAt(const MeshView& mesh, std::uint32_t v, int label) {
+  if (mesh.corner_sectors)
+    if (const auto at = mesh.corner_sectors->find(v); at != mesh.corner_sectors->end()) {
+      std::vector<WallSet> sectors = at->second;
+      if (label != 0)
+        std::erase_if(sectors, [&](WallSet sector) { return mesh.table->Of(sector) != label; });
+      return sectors;
+    }
+  return SectorsOf(*mesh.table, mesh.WallsOf(v), mesh.signs[v], label);
+}
+
+std::vector<std::size_t> PartsOfSectors(const std::vector<WallSet>& sectors) {
+  Parts parts(sectors.size());
+  for (std::size_t i = 0; i < sectors.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (CountWalls(sectors[i] ^ sectors[j]) == 1) parts.Join(i, j);
+  std::vector<std::size_t> roots(sectors.size());
+  for (std::size_t i = 0; i < sectors.size(); ++i) roots[i] = parts.Root(i);
+  return roots;
+}
 
 std::uint32_t ClosedOff::Original(std::uint32_t id) const {
   const auto vertices = static_cast<std::uint32_t>(apex - copied.size());

@@ -44,6 +44,15 @@ struct ClosedOff {
 ClosedOff CloseOff(const MeshView& mesh, const std::vector<std::uint32_t>& simplices, int label,
                    FunctionRef<bool(const FaceMesh&)> is_end);
 
+// Returns the sectors of a region, or of all of M if `label` is 0, at a point on `walls`, given the
+// signs of all others.
+std::vector<WallSet> SectorsOf(const LabelTable& table, WallSet walls, WallSet signs, int label);
+// The same at a vertex.
+std::vector<WallSet> SectorsAt(const MeshView& mesh, std::uint32_t v, int label);
+// Returns the part that each sector is in, as the place of one of them: sectors that share a wall
+// are in one part.
+std::vector<std::size_t> PartsOfSectors(const std::vector<WallSet>& sectors);
+
 // Whether M ends at a face: there is a region on one side of it alone.
 inline bool IsEnd(const FaceMesh& face) {
   return (face.sides.first == 0) != (face.sides.second == 0);

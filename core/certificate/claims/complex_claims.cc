@@ -17,9 +17,6 @@
 namespace stellate::core {
 namespace {
 
-// R1 is decided on circumradii in tangent spaces; rounding may differ.
-constexpr double kSizeTolerance = 1e-6;
-
 // Whether the simplices are a complex. If not, refuses them.
 bool IsComplex(Examination& x) {
   if (x.mesh.vertices >= std::numeric_limits<std::uint32_t>::max()) {
@@ -226,6 +223,7 @@ std::optional<StarGeometry> JudgeComplex(Examination& x) {
   JudgeStars(x, stars);
   x.shape = std::move(stars.shape);
   JudgeSize(x);
+  if (closed) BoundaryClaims(x).JudgeVolume();
   x.longest_edge = std::move(stars.longest_edge);
   return stars;
 }

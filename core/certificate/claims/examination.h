@@ -61,6 +61,9 @@ struct Examination {
   std::set<std::uint32_t> pinched;  // vertices, as of Certificate::pinched_vertices
 };
 
+// R1 is decided on circumradii in tangent spaces; rounding may differ.
+inline constexpr double kSizeTolerance = 1e-6;
+
 // Whether the answer to query j was found.
 inline bool Found(const AnswerBlock& answer, Eigen::Index j) {
   return answer.found.empty() || answer.found[static_cast<std::size_t>(j)] != 0;

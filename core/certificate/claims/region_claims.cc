@@ -7,7 +7,9 @@
 #include "core/base/message.h"
 #include "core/base/name_point.h"
 #include "core/certificate/claims/closed_off.h"
+#include "core/certificate/complex/betti.h"
 #include "core/certificate/complex/links.h"
+#include "core/certificate/measure/together.h"
 
 namespace stellate::core {
 namespace {
@@ -41,6 +43,20 @@ void RegionClaims::Judge() {
       ": the manifold, or a region of it, touches itself there in an edge or a point alone."));
 }
 
+// In R^3 what is outside of a region tells its cavities (Alexander), where it does not touch
+// itself.
+std::vector<std::int64_t> RegionClaims::BettiNumbersOf(const RegionReport& report,
+                                                       const std::vector<std::uint32_t>& simplices,
+                                                       const ClosedOff& closed_off) const {
+  const int k = x_.mesh.k;
+  const auto components = static_cast<std::int64_t>(report.components);
+  if (k < 3) return BettiNumbers(k, components, report.euler_characteristic, simplices);
+  if (k > 3 || x_.mesh.d > 3 || report.pinched > 0) return {};
+  const std::int64_t cavities =
+      static_cast<std::int64_t>(ShapeOf(k - 1, closed_off.Boundary(k)).components) - components;
+  return {components, components + cavities - report.euler_characteristic, cavities, 0};
+}
+
 void RegionClaims::JudgeRegion(int label, const std::vector<std::uint32_t>& simplices) {
   const int k = x_.mesh.k;
   const Adjacency region(SimplexList{k, static_cast<std::uint32_t>(x_.mesh.vertices), &simplices});
@@ -55,6 +71,11 @@ void RegionClaims::JudgeRegion(int label, const std::vector<std::uint32_t>& simp
   report.simplices = simplices.size() / (static_cast<std::size_t>(k) + 1);
   report.components = ComputeConnectivity(region).components;
   report.euler_characteristic = links.euler_characteristic + closed_off.EulerOfRest(k);
+  const Together measured = MeasureTogether(x_.mesh, k, simplices);
+  report.volume = measured.volume;
+  report.min_dihedral_degrees = measured.min_dihedral_degrees;
+  report.pinched = closed_off.copied.size();
+  report.betti = BettiNumbersOf(report, simplices, closed_off);
   x_.certificate.regions.push_back(report);
   const std::string name = Message("the region of label ", label);
   if (closed.bad_facets() > 0)

@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "core/batch.h"
+#include "core/certificate/claims/closed_off.h"
 #include "core/certificate/claims/examination.h"
 
 namespace stellate::core {
@@ -25,6 +26,9 @@ class RegionClaims {
 
  private:
   void JudgeRegion(int label, const std::vector<std::uint32_t>& simplices);
+  std::vector<std::int64_t> BettiNumbersOf(const RegionReport& report,
+                                           const std::vector<std::uint32_t>& simplices,
+                                           const ClosedOff& closed_off) const;
 
   Examination& x_;
 };

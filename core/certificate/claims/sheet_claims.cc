@@ -151,7 +151,16 @@ std::unique_ptr<SheetClaims::Sheet> SheetClaims::SheetOf(int wall) const {
     if (face.walls != SetOfWall(wall)) continue;
     sheet->simplices.insert(sheet->simplices.end(), face.simplices.begin(), face.simplices.end());
     sheet->sides.resize(sheet->simplices.size() / width, face.sides);
+    // Where the inside is not meshed the wall's own conormals tell how it faces.
+    const Eigen::Map<const Eigen::MatrixXd> conormals(
+        face.conormals.data(), x_.mesh.d,
+        static_cast<Eigen::Index>(face.conormals.size()) / x_.mesh.d);
+    for (Eigen::Index s = 0; s < conormals.cols(); s += x_.mesh.k) {
+      const Eigen::VectorXd sum = conormals.middleCols(s, x_.mesh.k).rowwise().sum();
+      sheet->outward.insert(sheet->outward.end(), sum.begin(), sum.end());
+    }
   }
+  const bool faces_are_known = !sheet->outward.empty();
   for (std::size_t s = 0; s < sheet->simplices.size(); s += width) {
     CheckInterruption(s);
     const std::uint32_t* ids = sheet->simplices.data() + s;
@@ -161,9 +170,11 @@ std::unique_ptr<SheetClaims::Sheet> SheetClaims::SheetOf(int wall) const {
     double radius = 0;
     for (std::size_t i = 0; i < width; ++i)
       radius = std::max(radius, (x_.Vertex(ids[i]) - barycentre).norm());
-    const Eigen::VectorXd outward = OutwardAt(ids, sheet->sides[s / width]);
     sheet->barycentres.insert(sheet->barycentres.end(), barycentre.begin(), barycentre.end());
-    sheet->outward.insert(sheet->outward.end(), outward.begin(), outward.end());
+    if (!faces_are_known) {
+      const Eigen::VectorXd outward = OutwardAt(ids, sheet->sides[s / width]);
+      sheet->outward.insert(sheet->outward.end(), outward.begin(), outward.end());
+    }
     sheet->radii.push_back(radius);
     sheet->largest_radius = std::max(sheet->largest_radius, radius);
   }
@@ -215,6 +226,17 @@ std::vector<QueryBlock> SheetClaims::Questions(const std::vector<std::uint32_t>&
   for (std::size_t wall = 0; wall < sheets_.size(); ++wall)
     blocks.push_back(
         QuestionsOf(wall, barycentres(Eigen::all, Spread(*sheets_[wall], barycentres, radii))));
+  return blocks;
+}
+
+std::vector<QueryBlock> SheetClaims::QuestionsFrom(const Eigen::MatrixXd& points) const {
+  std::vector<std::uint32_t> all(static_cast<std::size_t>(points.cols()));
+  std::iota(all.begin(), all.end(), 0u);
+  const std::vector<std::uint32_t> some =
+      Thinned(all, std::max(kLeastOfWall, kMostQuestions / sheets_.size()));
+  std::vector<QueryBlock> blocks;
+  for (std::size_t wall = 0; wall < sheets_.size(); ++wall)
+    blocks.push_back(QuestionsOf(wall, points(Eigen::all, some)));
   return blocks;
 }
 

@@ -27,6 +27,8 @@ class SheetClaims {
   // Returns a block for each wall: barycentres of some of the `chosen` simplices. Deep inside, one
   // query does for many simplices: the ball up to a closest point that far away contains no other.
   std::vector<QueryBlock> Questions(const std::vector<std::uint32_t>& chosen);
+  // Returns the same from some of these points (d x n), where the inside is not meshed.
+  std::vector<QueryBlock> QuestionsFrom(const Eigen::MatrixXd& points) const;
   // Takes the answers to one of these blocks, or to other queries on that wall alone.
   void Judge(std::size_t wall, const Eigen::MatrixXd& asked, const AnswerBlock& answer);
 

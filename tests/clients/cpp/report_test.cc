@@ -71,7 +71,7 @@ TEST(ReportJson, IsThatOfAllClients) {
       R"("violations": {"faces": [[1, 2], [1, 5]], "links": [], "stars": [7], )"
       R"("inconsistent": [], "fibres": [0, 3]}, "boundary_simplices": 0, )"
       R"("boundary_components": 0, "boundary_euler_characteristic": 0, "faces": [], )"
-      R"("sharpest": null, "regions": [], "only_too_coarse": false}, )"
+      R"("sharpest": null, "regions": [], "pinched_vertices": 0, "volume": 0, "only_too_coarse": false}, )"
       R"("elapsed_seconds": 0.5, )"
       R"("version": "0.2.0"})");
   report.epsilon = 0;

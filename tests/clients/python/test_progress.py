@@ -186,7 +186,7 @@ AS_JSON = (
     '"violations": {"faces": [[1, 2], [1, 5]], "links": [], "stars": [7], "inconsistent": [], '
     '"fibres": [0, 3]}, "boundary_simplices": 0, "boundary_components": 0, '
     '"boundary_euler_characteristic": 0, "faces": [], "sharpest": null, "regions": [], '
-    '"only_too_coarse": false}, "elapsed_seconds": 0.5, '
+    '"pinched_vertices": 0, "volume": 0, "only_too_coarse": false}, "elapsed_seconds": 0.5, '
     f'"version": "{stellate.__version__}"}}'
 )
 

@@ -5,10 +5,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <cstdint>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <string>
 #include <tuple>
+#include <utility>
+#include <vector>
 
 #include "core/mesher.h"
 #include "tests/core/support/homology.h"
@@ -132,9 +137,36 @@ TEST_P(ArrangementsTest, AreMeshedRegionByRegion) {
     const Complex& simplices = mesh->regions.at(region.label);
     EXPECT_EQ(region.simplices, simplices.size());
     EXPECT_EQ(region.euler_characteristic, testing::EulerOf(simplices)) << region.label;
+    EXPECT_NEAR(region.volume, Volume(*mesh, simplices), 1e-9 * region.volume);
+    if (arrangement.domain.k < 3 || region.pinched == 0) {
+      const std::vector<int> betti = testing::BettiNumbers(simplices);
+      EXPECT_EQ(region.betti, std::vector<std::int64_t>(betti.begin(), betti.end()));
+    }
+    EXPECT_GT(region.min_dihedral_degrees, arrangement.domain.k == 2 ? 10 : 2) << region.label;
+    EXPECT_LT(region.min_dihedral_degrees, 60);
     if (const auto known = arrangement.euler.find(region.label); known != arrangement.euler.end()) {
       EXPECT_EQ(region.euler_characteristic, known->second) << region.label;
     }
+  }
+  // Regions add up to all of M, and each interface is what two of them have in common.
+  double together = 0;
+  for (const RegionReport& region : certificate.regions) together += region.volume;
+  EXPECT_NEAR(certificate.volume, together, 1e-9 * together);
+  std::map<std::pair<int, int>, double> areas;
+  for (const FaceReport& face : certificate.faces)
+    if (face.dimension == arrangement.domain.k - 1)
+      areas[std::minmax(face.sides.first, face.sides.second)] += face.volume;
+  for (const auto& [sides, area] : areas) {
+    if (sides.first == 0) continue;
+    const auto facets = [&](int label) {
+      return testing::FacesOf(
+          mesh->regions.at(label))[static_cast<std::size_t>(arrangement.domain.k - 1)];
+    };
+    const Complex one = facets(sides.first), other = facets(sides.second);
+    Complex common;
+    std::set_intersection(one.begin(), one.end(), other.begin(), other.end(),
+                          std::inserter(common, common.end()));
+    EXPECT_NEAR(area, Volume(*mesh, common), 1e-9 * area);
   }
   // Each facet is in two simplices, or M ends there, on a wall.
   Complex all;

@@ -328,9 +328,11 @@ TEST(ConvertMesh, DeltasKeepTheirRows) {
 
 TEST(ConvertReport, TellsOfRegionsAndOfTheSidesOfTheirWalls) {
   core::Report report;
-  report.certificate.regions = {{2, 30, 1, 1}, {5, 40, 2, -1}};
-  report.certificate.faces = {{core::WallSet{3}, 1, 7, 2, 0},
-                              {core::WallSet{1}, 2, 9, 1, 1, {5, 2}}};
+  report.certificate.regions = {{2, 30, 1, 1, 0.25, 12, 0, {1, 0, 0, 0}},
+                                {5, 40, 2, -1, 0.5, 9, 3, {}}};
+  report.certificate.faces = {{core::WallSet{3}, 1, 7, 2, 0, {0, 1}, 4, {2, 2}},
+                              {core::WallSet{1}, 2, 9, 1, 1, {5, 2}, 1.5, {1, 0, 0}}};
+  report.certificate.volume = 0.75;
   v1::Report sent;
   ToProto(report, 3, &sent);
   const v1::Certificate& certificate = sent.certificate();
@@ -339,6 +341,14 @@ TEST(ConvertReport, TellsOfRegionsAndOfTheSidesOfTheirWalls) {
   EXPECT_EQ(certificate.regions(1).simplices(), 40u);
   EXPECT_EQ(certificate.regions(1).components(), 2u);
   EXPECT_EQ(certificate.regions(1).euler_characteristic(), -1);
+  EXPECT_EQ(certificate.regions(1).volume(), 0.5);
+  EXPECT_EQ(certificate.regions(1).min_dihedral_degrees(), 9);
+  EXPECT_EQ(certificate.regions(1).pinched(), 3u);
+  EXPECT_EQ(certificate.regions(0).betti_size(), 4);
+  EXPECT_EQ(certificate.regions(1).betti_size(), 0);
+  EXPECT_EQ(certificate.faces(1).volume(), 1.5);
+  EXPECT_EQ(certificate.faces(0).betti(1), 2);
+  EXPECT_EQ(certificate.volume(), 0.75);
   EXPECT_FALSE(certificate.faces(0).has_label_below()) << "an edge has more than two sides";
   EXPECT_EQ(certificate.faces(1).label_below(), 5u);
   EXPECT_EQ(certificate.faces(1).label_above(), 2u);
@@ -349,7 +359,7 @@ TEST(ConvertReport, TellsOfFacesAndWhereWallsMeetMostSharply) {
   report.certificate.boundary_simplices = 12;
   report.certificate.boundary_components = 2;
   report.certificate.boundary_euler_characteristic = -4;
-  report.certificate.faces = {{core::WallSet{5}, 1, 7, 2, -3}};
+  report.certificate.faces = {{core::WallSet{5}, 1, 7, 2, -3, {0, 1}, 0, {}}};
   v1::Report sent;
   ToProto(report, 3, &sent);
   EXPECT_FALSE(sent.certificate().has_sharpest());

@@ -190,6 +190,20 @@ TEST(MeshHistory, LabelsComeWithTheirSimplices) {
     }
 }
 
+// The boundary alone has two labels for each simplex, which say where outside is.
+TEST(MeshHistory, TurnsABoundaryByItsLabels) {
+  MeshHistory mesh(2, 3, 2);
+  core::MeshDelta delta = Delta(1, 0, 4, {{0, 1, 2}, {0, 1, 3}, {0, 2, 3}, {1, 2, 3}}, {});
+  delta.labels = {0, 1, 1, 0, 0, 2, 2, 1};
+  ASSERT_TRUE(mesh.Append(delta).ok());
+  mesh.Orient();
+  ASSERT_TRUE(mesh.orientation());
+  EXPECT_TRUE(mesh.orientation()->orientable);
+  EXPECT_EQ(mesh.orientation()->turned, std::vector<std::uint8_t>{0b0101});
+  MeshHistory::Cursor cursor = mesh.Begin(0);
+  EXPECT_EQ(mesh.Next(&cursor, 1 << 20).labels, delta.labels);
+}
+
 TEST(MeshHistory, APartBegunBeforeMoreCameLeadsWhereItSaid) {
   std::mt19937 random(11);
   History history;

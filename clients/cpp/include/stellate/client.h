@@ -50,6 +50,9 @@ struct MeshOptions {
   std::optional<double> reach;
   // Look for every component in the bounding box, which `reach` makes finite.
   std::optional<bool> cover_box;
+  // Mesh the boundary of a solid alone, and what is between regions, without the inside: the mesh
+  // has simplices of one dimension less, their normals outwards.
+  std::optional<bool> boundary_only;
 
   std::optional<double> radius_edge_bound;    // rho0 of rule R2
   std::optional<double> sliver_bound;         // Theta0 of rule R3

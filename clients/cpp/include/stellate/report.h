@@ -79,14 +79,21 @@ struct FaceCertificate {
   std::int64_t euler_characteristic = 0;
   // Of a wall of an arrangement: the labels where it is negative and where it is positive.
   std::optional<std::uint32_t> label_below, label_above;
+  double volume = 0;                // length^dimension: an area, a length; of corners their number
+  std::vector<std::int64_t> betti;  // over Z/2, from dimension 0 on; empty: not computed
 };
 
-// A region of an arrangement of walls: the part of the mesh with one label.
+// A region of an arrangement of walls: the part of the mesh with one label. Of the boundary alone
+// the region's surface, except the volume.
 struct RegionCertificate {
   std::uint32_t label = 0;
   std::uint64_t simplices = 0;
   std::uint64_t components = 0;
   std::int64_t euler_characteristic = 0;
+  double volume = 0;                // 0 of the boundary alone of what does not fill space
+  double min_dihedral_degrees = 0;  // the least angle between two facets of a simplex
+  std::uint64_t pinched = 0;        // vertices where it touches itself, once for each touch
+  std::vector<std::int64_t> betti;  // over Z/2, from dimension 0 on; empty: not computed
 };
 
 // Two walls that meet.
@@ -143,6 +150,8 @@ struct Certificate {
   std::optional<WallAngle> sharpest;       // where walls meet at the smallest angle, if any meet
   std::vector<RegionCertificate> regions;  // of an arrangement of walls, by label
   std::uint64_t pinched_vertices = 0;      // where a region touches itself in an edge or a point
+  // With walls, of all of M, to which regions add up; of the boundary alone what it encloses.
+  double volume = 0;
 
   // Refused for epsilon alone: no check contradicts the mesh, which is too coarse, compared with
   // the reach, to be certified.

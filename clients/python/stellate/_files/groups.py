@@ -41,6 +41,8 @@ class Group:
 def groups(mesh: Complex, cells: np.ndarray) -> list[Group]:
     """All of a mesh with these cells, oriented or not: one group, where it has no boundary."""
     labels = mesh.labels
+    if labels is not None and labels.ndim == 2:
+        return _boundary_groups(mesh, cells)
     found = [Group(1, "inside", (), cells)]
     if labels is not None and len(np.unique(labels)) > 1:
         found = [
@@ -54,9 +56,25 @@ def groups(mesh: Complex, cells: np.ndarray) -> list[Group]:
             if dimension == mesh.dimension - 1 >= 1:
                 for region in reversed(regions):  # of several, the first one's turn stays
                     rows = _turned(rows, region)
-            plural = "s" if len(face.walls) > 1 else ""
-            name = f"wall{plural}_" + "_".join(map(str, face.walls))
-            found.append(Group(len(found) + 1, name, face.walls, rows))
+            found.append(Group(len(found) + 1, _name(face.walls), face.walls, rows))
+    return found
+
+
+def _name(walls: tuple[int, ...]) -> str:
+    return f"wall{'s' if len(walls) > 1 else ''}_" + "_".join(map(str, walls))
+
+
+def _boundary_groups(mesh: Complex, cells: np.ndarray) -> list[Group]:
+    """A boundary without its inside: its walls, and where they meet."""
+    found: list[Group] = []
+    assert mesh.walls is not None
+    bits = np.bitwise_and.reduce(mesh.walls[mesh.simplices], axis=1)
+    for dimension in reversed(range(mesh.dimension + 1)):
+        for face in mesh.faces(dimension):
+            rows = face.simplices
+            if dimension == mesh.dimension:
+                rows = cells[bits == sum(1 << wall for wall in face.walls)]
+            found.append(Group(len(found) + 1, _name(face.walls), face.walls, rows))
     return found
 
 

@@ -18,7 +18,7 @@ def _keys(rows: np.ndarray) -> np.ndarray:
         if used + bits > 64:  # their ranks need fewer bits
             keys = np.unique(keys, return_inverse=True)[1].astype(np.uint64)
             used = len(rows).bit_length()
-        keys = (keys << np.uint64(bits)) | column
+        keys = (keys << np.uint64(bits)) | column.astype(np.uint64)
         used += bits
     return keys
 
@@ -78,21 +78,25 @@ def spread_walls(boundary: list[tuple[np.ndarray, np.ndarray]], vertices: int) -
 
 
 def labels_from_wire(labels: bytes, rows: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
-    """What a message says of the regions of simplices: none or one pair of arrays.
+    """What a message says of the regions of simplices: none or one pair of arrays. Of the boundary
+    alone each simplex has two labels.
 
     Raises: ValueError if there are not that many simplices.
     """
     if not labels:
         return []
-    if len(labels) != len(rows):
+    of = np.frombuffer(labels, dtype=np.int8)
+    if len(of) == 2 * len(rows):
+        return [(rows, of.reshape(-1, 2))]
+    if len(of) != len(rows):
         raise ValueError(f"{len(labels)} labels do not fit {len(rows)} simplices")
-    return [(rows, np.frombuffer(labels, dtype=np.int8))]
+    return [(rows, of)]
 
 
 def spread_labels(
     labels: list[tuple[np.ndarray, np.ndarray]], rows: np.ndarray
 ) -> np.ndarray | None:
-    """(m,) int8 of these rows, from what labels_from_wire found; None where there was nothing.
+    """(m,) int8, or (m, 2), of these rows, from what labels_from_wire found; None where there was nothing.
 
     Raises: ValueError if there is none for one of them.
     """
@@ -204,7 +208,8 @@ class DeltaMesh:
         return spread_walls(self._boundary, self._vertex_count)
 
     def labels(self) -> np.ndarray | None:
-        """(m,) int8, the region of each of the simplices(); None where there are none."""
+        """(m,) int8, the region of each of the simplices(); of the boundary alone (m, 2), those of
+        both sides; None where there are none."""
         self.settle()
         return spread_labels(self._labels, self._rows)
 

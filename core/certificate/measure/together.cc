@@ -1,0 +1,94 @@
+#include "core/certificate/measure/together.h"
+
+#include <Eigen/Core>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "core/base/parallel.h"
+#include "core/geometry/simplex.h"
+#include "core/specification.h"
+
+namespace stellate::core {
+namespace {
+
+using Small =
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxDimension + 1, kMaxDimension + 1>;
+
+// Returns the largest cosine of an angle between two facets; 1 for a degenerate simplex. The
+// gradients of barycentric coordinates are normal to facets, and the inverse of the edges' Gram
+// matrix has their inner products.
+double LargestCosine(const MeshView& mesh, int dimension, const std::uint32_t* ids) {
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic> edges(mesh.d, dimension);
+  const Eigen::Map<const Eigen::VectorXd> first(mesh.Point(ids[0]), mesh.d);
+  for (int i = 0; i < dimension; ++i)
+    edges.col(i) = Eigen::Map<const Eigen::VectorXd>(mesh.Point(ids[i + 1]), mesh.d) - first;
+  const Small gram = edges.transpose() * edges;
+  const Eigen::FullPivLU<Small> decomposed(gram);
+  if (!decomposed.isInvertible()) return 1;
+  Small products(dimension + 1, dimension + 1);
+  products.bottomRightCorner(dimension, dimension) = decomposed.inverse();
+  for (int i = 1; i <= dimension; ++i) {
+    products(i, 0) = -products.row(i).tail(dimension).sum();
+    products(0, i) = products(i, 0);
+  }
+  products(0, 0) = -products.row(0).tail(dimension).sum();
+  double largest = -1;
+  for (int i = 0; i <= dimension; ++i)
+    for (int j = 0; j < i; ++j)
+      largest = std::max(largest, -products(i, j) / std::sqrt(products(i, i) * products(j, j)));
+  return std::isnan(largest) ? 1 : std::min(largest, 1.0);
+}
+
+}  // namespace
+
+Together MeasureTogether(const MeshView& mesh, int dimension,
+                         const std::vector<std::uint32_t>& simplices) {
+  const auto width = static_cast<std::size_t>(dimension) + 1;
+  const std::size_t count = simplices.size() / width;
+  struct Part {
+    double volume = 0, cosine = -1;
+  };
+  std::vector<Part> parts(ChunkCount(count));
+  ParallelChunks(count, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+    Part part;
+    for (std::size_t s = begin; s < end; ++s) {
+      const std::uint32_t* const ids = simplices.data() + s * width;
+      const double* corners[kMaxDimension + 1];
+      for (std::size_t i = 0; i < width; ++i) corners[i] = mesh.Point(ids[i]);
+      part.volume += MeasureSimplex({corners, width}, mesh.d).volume;
+      if (dimension >= 2) part.cosine = std::max(part.cosine, LargestCosine(mesh, dimension, ids));
+    }
+    parts[chunk] = part;
+  });
+  Together all;
+  double cosine = -1;
+  for (const Part& part : parts) {
+    all.volume += part.volume;
+    cosine = std::max(cosine, part.cosine);
+  }
+  if (dimension >= 2 && count > 0)
+    all.min_dihedral_degrees = std::acos(cosine) * 180 / std::numbers::pi;
+  return all;
+}
+
+double EnclosedVolume(const MeshView& mesh, const std::vector<std::uint32_t>& simplices,
+                      const std::vector<bool>& turned) {
+  const auto d = static_cast<std::size_t>(mesh.d);
+  double sum = 0, faculty = 1;
+  for (int i = 2; i <= mesh.d; ++i) faculty *= i;
+  if (simplices.empty()) return 0;
+  // From a vertex of it: far from the origin the terms would cancel.
+  const Eigen::Map<const Eigen::VectorXd> apex(mesh.Point(simplices[0]), mesh.d);
+  Small corners(mesh.d, mesh.d);
+  for (std::size_t s = 0; s < turned.size(); ++s) {
+    for (std::size_t i = 0; i < d; ++i)
+      corners.col(static_cast<Eigen::Index>(i)) =
+          Eigen::Map<const Eigen::VectorXd>(mesh.Point(simplices[s * d + i]), mesh.d) - apex;
+    sum += (turned[s] ? -1 : 1) * corners.determinant();
+  }
+  return sum / faculty;
+}
+
+}  // namespace stellate::core
