@@ -16,6 +16,7 @@
 #include "doctor_command.h"
 #include "download_command.h"
 #include "mesh_command.h"
+#include "reconstruct_command.h"
 #include "serve_command.h"
 #include "server_options.h"
 #include "stellate/catalogue.h"
@@ -105,6 +106,7 @@ int Main(int argc, char** argv) {
   app.set_version_flag("--version", "stellate " STELLATE_VERSION);
   app.require_subcommand(1);
   stellate::cli::MeshCommand mesh(app);
+  stellate::cli::ReconstructCommand reconstruct(app);
   const CLI::App* list = app.add_subcommand("list", "Show the catalogue of manifolds");
   const stellate::cli::CancelCommand cancel(app);
   const stellate::cli::ConformCommand conform(app);
@@ -142,6 +144,7 @@ int Main(int argc, char** argv) {
   if (declare.chosen()) return declare.Run(signals.token());
   if (serve.chosen()) return serve.Run(signals.token());
   if (view.chosen()) return view.Run(signals.token());
+  if (reconstruct.chosen()) return reconstruct.Run(signals.token());
   if (download.chosen()) return download.Run(signals.token());
   return top.chosen() ? top.Run(signals.token()) : mesh.Run(signals.token());
 }

@@ -190,6 +190,30 @@ std::string CertificateJson(const Certificate& c) {
   return json.Take();
 }
 
+std::string ReconstructionJson(const ReconstructionReport& r) {
+  JsonObject places, advice, json;
+  for (const ReconstructionReport::Place& place : r.places) {
+    places.Add(place.name.c_str(), place.points);
+    if (!place.advice.empty()) advice.Add(place.name.c_str(), place.advice);
+  }
+  json.Raw("places", places.Take());
+  json.Raw("advice", advice.Take());
+  json.Add("spacing", r.spacing);
+  json.Add("noise", r.noise);
+  json.Add("noise_ratio", r.noise_ratio);
+  json.Add("smoothed", r.smoothed);
+  json.Add("doubtful", r.doubtful);
+  json.Add("cavities", r.cavities);
+  json.Add("tiles", r.tiles);
+  json.Add("unfilled_vertices", r.unfilled_vertices);
+  std::string looks;
+  for (const double share : r.looks) {
+    looks += (looks.empty() ? "" : ", ") + JsonObject::Number(share);
+  }
+  json.Raw("looks", "[" + looks + "]");
+  return json.Take();
+}
+
 }  // namespace
 
 const char* TerminationName(Termination termination) {
@@ -200,7 +224,7 @@ const char* TerminationName(Termination termination) {
 }
 
 const char* CertificateLevelName(CertificateLevel level) {
-  constexpr const char* kNames[] = {"UNKNOWN", "REFUSED", "SAMPLED", "PROVED"};
+  constexpr const char* kNames[] = {"UNKNOWN", "REFUSED", "SAMPLED", "PROVED", "DECIDED"};
   const size_t i = static_cast<size_t>(level);
   return i < std::size(kNames) ? kNames[i] : kNames[0];
 }
@@ -225,6 +249,9 @@ std::string ToJson(const Report& report) {
   json.Add("epsilon_reason", report.epsilon_reason);
   json.Raw("counts", CountsJson(report.counts));
   json.Raw("certificate", CertificateJson(report.certificate));
+  if (report.reconstruction) {
+    json.Raw("reconstruction", ReconstructionJson(*report.reconstruction));
+  }
   json.Add("elapsed_seconds", report.elapsed_seconds);
   json.Add("version", std::string(STELLATE_VERSION));
   return json.Take();

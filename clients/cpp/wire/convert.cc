@@ -214,6 +214,25 @@ std::optional<std::uint32_t> LabelOf(bool there, std::uint32_t label) {
   return there ? std::optional(label) : std::nullopt;
 }
 
+ReconstructionReport FromProto(const v1::ReconstructionReport& m) {
+  ReconstructionReport r;
+  for (const v1::ReconstructionReport::Count& place : m.places()) {
+    std::string name = v1::Place_Name(place.place());
+    name = name.starts_with("PLACE_") ? name.substr(6) : "UNKNOWN";
+    r.places.push_back({std::move(name), place.points(), place.advice()});
+  }
+  r.spacing = m.spacing();
+  r.noise = m.noise();
+  r.noise_ratio = m.noise_ratio();
+  r.smoothed = m.smoothed();
+  r.doubtful = m.doubtful();
+  r.cavities = m.cavities();
+  r.tiles = m.tiles();
+  r.unfilled_vertices = m.unfilled_vertices();
+  r.looks.assign(m.looks().begin(), m.looks().end());
+  return r;
+}
+
 Violations FromProto(const v1::Violations& m) {
   Violations v{{}, Ids(m.links()), Ids(m.stars()), Ids(m.inconsistent()), Ids(m.fibres())};
   const std::vector<std::uint32_t> ids = Ids(m.faces());
@@ -240,6 +259,7 @@ Report ReportOf(const v1::Mesh& mesh) {
   r.failure_message = m.failure().message();
   r.elapsed_seconds = m.elapsed_seconds();
   r.text = m.text();
+  if (m.has_reconstruction()) r.reconstruction = FromProto(m.reconstruction());
   const v1::Counts& n = m.counts();
   r.counts = {n.vertices(),
               n.simplices(),

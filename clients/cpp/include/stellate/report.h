@@ -55,6 +55,8 @@ enum class CertificateLevel {
   kRefused,
   kSampled,  // every check passed; some look at samples of the manifold
   kProved,   // and if its reach is as declared, the mesh is isotopic to the components it meets
+  kDecided,  // of reconstructions, below kSampled: a manifold, but the points say too little for
+             // more, and it is not certified
 };
 const char* CertificateLevelName(CertificateLevel level);  // "PROVED", ...
 
@@ -158,11 +160,32 @@ struct Certificate {
   bool only_too_coarse = false;
 };
 
+// What a reconstruction found of its points. Lengths are in the coordinates' unit.
+struct ReconstructionReport {
+  struct Place {
+    std::string name;          // "OK", "MERGED", ...
+    std::uint64_t points = 0;  // that have it
+    std::string advice;        // the cause and the cure; empty where nothing is to be done
+  };
+  std::vector<Place> places;
+  double spacing = 0;          // median distance of a point to its nearest
+  double noise = 0;            // median rms distance of the points to the surface fitted to them
+  double noise_ratio = 0;      // the same in units of the local spacing
+  bool smoothed = false;       // the complex was built on copies moved to the fitted surface
+  std::uint64_t doubtful = 0;  // simplices about which stars disagreed at first
+  std::uint64_t cavities = 0;  // the places that they made up
+  std::uint64_t tiles = 0;     // simplices of the tilings that filled them
+  std::uint64_t unfilled_vertices = 0;  // of the cavities that were left
+  std::vector<double> looks;  // the share of points around which they look of dimension 1, 2, 3,
+                              // 4, and more
+};
+
 struct Report {
   Termination termination = Termination::kUnknown;
   std::string failure_reason, failure_message;  // kOracleFailed only
   Counts counts;
   Certificate certificate;
+  std::optional<ReconstructionReport> reconstruction;  // of a mesh of points alone
   double elapsed_seconds = 0;
   double epsilon = 0;          // of the mesh; 0: not known
   std::string epsilon_reason;  // why it was chosen; empty if it was given

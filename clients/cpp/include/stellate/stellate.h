@@ -15,6 +15,7 @@
 #include "stellate/oracles/combined.h"
 #include "stellate/oracles/walls.h"
 #include "stellate/pointwise.h"
+#include "stellate/reconstruct.h"
 #include "stellate/serve.h"
 #include "stellate/solids.h"
 #include "stellate/version.h"

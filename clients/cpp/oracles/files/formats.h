@@ -1,5 +1,7 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <string>
 #include <string_view>
 
 #include "stellate/oracles/points.h"
@@ -14,6 +16,11 @@ Triangles ParseObj(std::string_view bytes);
 Triangles ParseOff(std::string_view bytes);  // as text
 Triangles ParsePly(std::string_view bytes);  // as text, or binary of either byte order
 Triangles ParseStl(std::string_view bytes);  // as text, or binary; equal corners become one point
+
+// d x n. Refused where a number is not finite, or a point has fewer or more than others.
+Eigen::MatrixXd ParsePlyPoints(std::string_view bytes);  // of the vertices; d is 3
+Eigen::MatrixXd ParseNpy(std::string_view bytes);
+Eigen::MatrixXd ParsePointText(std::string text);
 
 struct Format {
   const char* ending;

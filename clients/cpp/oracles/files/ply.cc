@@ -172,7 +172,7 @@ void ReadFaces(const PlyElement& face, Body* body, Soup* soup) {
 }
 
 template <typename Body>
-Triangles Read(const PlyHeader& header, Body body) {
+Soup Read(const PlyHeader& header, Body body) {
   Soup soup("face");
   for (const PlyElement& element : header.elements) {
     if (element.properties.empty()) continue;  // no bytes, however many there are
@@ -190,15 +190,23 @@ Triangles Read(const PlyHeader& header, Body body) {
       }
     }
   }
-  return soup.Finish();
+  return soup;
+}
+
+Soup Read(std::string_view bytes) {
+  const PlyHeader header = ParsePlyHeader(bytes);
+  if (header.format == PlyFormat::kText) return Read(header, TextBody(bytes, header));
+  return Read(header, BinaryBody(bytes, header));
 }
 
 }  // namespace
 
-Triangles ParsePly(std::string_view bytes) {
-  const PlyHeader header = ParsePlyHeader(bytes);
-  if (header.format == PlyFormat::kText) return Read(header, TextBody(bytes, header));
-  return Read(header, BinaryBody(bytes, header));
+Triangles ParsePly(std::string_view bytes) { return Read(bytes).Finish(); }
+
+Eigen::MatrixXd ParsePlyPoints(std::string_view bytes) {
+  const Soup soup = Read(bytes);
+  if (soup.size() == 0) Refuse("it has no points");
+  return soup.Points();
 }
 
 }  // namespace stellate::oracles::files

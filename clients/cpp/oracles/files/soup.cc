@@ -27,6 +27,10 @@ void Soup::AddPolygon(const std::vector<std::int64_t>& corners, size_t place) {
   }
 }
 
+Eigen::MatrixXd Soup::Points() const {
+  return Eigen::Map<const Eigen::MatrixXd>(points_.data(), 3, size());
+}
+
 Triangles Soup::Finish() const {
   if (size() > std::numeric_limits<int>::max()) {
     Refuse("it has " + std::to_string(size()) + " points, and no more than 2,147,483,647 are read");
@@ -37,7 +41,7 @@ Triangles Soup::Finish() const {
            " points: is the file whole?");
   }
   if (corners_.empty()) Refuse("it has no triangles");
-  return {Eigen::Map<const Eigen::MatrixXd>(points_.data(), 3, size()),
+  return {Points(),
           Eigen::Map<const Eigen::MatrixXi>(corners_.data(), 3, std::ssize(corners_) / 3)};
 }
 

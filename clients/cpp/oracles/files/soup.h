@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
 #include <string>
 #include <vector>
@@ -22,6 +23,7 @@ class Soup {
   // and left out. Refused where one is negative.
   void AddPolygon(const std::vector<std::int64_t>& corners, size_t place);
 
+  Eigen::MatrixXd Points() const;  // 3 x n
   // Refused without triangles, or where one names a point that is not there.
   Triangles Finish() const;
 

@@ -58,6 +58,13 @@ struct Triangles {
 // std::invalid_argument, saying which file.
 Triangles ReadTriangles(const std::string& path);
 
+// Reads points, d x n: of .ply the x, y and z of its vertices, whatever faces it has; of .npy an
+// array (n, d); of .csv, .xyz and .txt, and of standard input, "-", a point a line, its numbers
+// between blanks or commas, after a line of titles if there is one, without what follows '#'.
+// `coordinates`: keeps the first so many of each; by default all. Throws std::invalid_argument,
+// saying which file and which line.
+Eigen::MatrixXd ReadPoints(const std::string& path, std::optional<int> coordinates = {});
+
 struct TriangleMeshOptions {
   // Triangles with longer edges are filled with points of this spacing; by default the median of
   // the edges' lengths.

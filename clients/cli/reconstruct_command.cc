@@ -1,0 +1,81 @@
+#include "reconstruct_command.h"
+
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <iostream>
+#include <utility>
+
+#include "progress_bar.h"
+#include "stellate/oracles/points.h"
+
+namespace stellate::cli {
+
+ReconstructCommand::ReconstructCommand(CLI::App& parent)
+    : command_(parent.add_subcommand("reconstruct", "Make a mesh of points on a manifold")),
+      server_(command_, "") {
+  command_
+      ->add_option("points", points_,
+                   ".ply, .npy, .csv, .xyz or .txt; -: a point a line from standard input")
+      ->required();
+  command_->add_option("-k,--dimension", options_.dimension, "dimension of the manifold, 1 to 3")
+      ->required();
+  outputs_.AddTo(command_);
+  command_->add_option("--ambient", coordinates_,
+                       "coordinates of a point; the first of each line, where there are more");
+  command_->add_option("--noise", options_.noise,
+                       "standard deviation of each coordinate, a length; 0: none; default: as the "
+                       "points show");
+  command_->add_option("--reach", options_.reach,
+                       "a lower bound of the manifold's reach, from which the mesh may be proved");
+  command_->add_option("--drop", options_.drop, "share of the points that may be left out")
+      ->capture_default_str();
+  command_->add_flag("--open", open_, "the manifold may have a boundary");
+  server_.AddReconnect(command_);
+  command_->add_option("--report", report_, "file for the report as JSON");
+  command_->add_flag("--json", json_, "print the report as JSON");
+  command_->add_flag("-q,--quiet", quiet_, "no progress and no report");
+  command_->footer(
+      "Exit status: 0 certified, 1 not certified, 2 usage or refused, 3 server failed.");
+}
+
+int ReconstructCommand::Run(std::stop_token stop) {
+  Eigen::MatrixXd points;
+  try {
+    points = oracles::ReadPoints(points_, coordinates_);
+  } catch (const std::exception& error) {
+    return PrintError({ErrorCode::kRefused, "", error.what()});
+  }
+  const auto d = static_cast<int>(points.rows());
+  if (const auto ok = outputs_.Check(options_.dimension, d); !ok) return PrintError(ok.error());
+  Expected<Connection> connection = server_.Read();
+  if (!connection) return PrintError(connection.error());
+  options_.connection = std::move(*connection);
+  options_.closed = !open_;
+  options_.label = "stellate reconstruct";
+  options_.stop = std::move(stop);
+  ProgressBar bar(quiet_);
+  options_.on_progress = [&bar](const Progress& progress) { bar.Show(progress); };
+  options_.connection.on_outage = [this, &bar](const Outage& outage) {
+    bar.Clear();
+    PrintOutage(outage, options_.connection.reconnect);
+  };
+  const Expected<Mesh> mesh = Reconstruct(points, options_);
+  bar.Clear();
+  return mesh ? Deliver(*mesh) : PrintError(mesh.error());
+}
+
+int ReconstructCommand::Deliver(const Mesh& mesh) const {
+  int status = outputs_.Write(mesh, mesh.report.certified() ? kExitCertified : kExitNotCertified);
+  if (!report_.empty()) {
+    const Expected<void> saved = SaveJson(mesh.report, report_);
+    if (!saved) status = PrintError(saved.error());
+  }
+  if (json_) {
+    std::cout << ToJson(mesh.report) << "\n";
+  } else if (!quiet_) {
+    PrintReport(mesh.report);
+  }
+  return status;
+}
+
+}  // namespace stellate::cli

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <CLI/App.hpp>
+#include <stop_token>
+#include <string>
+
+#include "outputs.h"
+#include "server_options.h"
+#include "stellate/reconstruct.h"
+
+namespace stellate::cli {
+
+// `stellate reconstruct`.
+class ReconstructCommand {
+ public:
+  explicit ReconstructCommand(CLI::App& parent);
+  bool chosen() const { return command_->parsed(); }
+  int Run(std::stop_token stop);
+
+ private:
+  int Deliver(const Mesh& mesh) const;
+
+  CLI::App* command_;
+  ServerOptions server_;
+  ReconstructOptions options_;
+  std::string points_;
+  std::optional<int> coordinates_;
+  Outputs outputs_;
+  std::string report_;
+  bool open_ = false, json_ = false, quiet_ = false;
+};
+
+}  // namespace stellate::cli

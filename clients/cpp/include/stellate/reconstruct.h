@@ -1,0 +1,44 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <functional>
+#include <optional>
+#include <stop_token>
+#include <string>
+
+#include "stellate/connection.h"
+#include "stellate/error.h"
+#include "stellate/mesh.h"
+
+namespace stellate {
+
+// What points are, and how they are to become a mesh.
+struct ReconstructOptions {
+  int dimension = 0;  // k of the manifold, 1 to 3; required
+  // The standard deviation of each coordinate from the manifold, a length; 0: points are on it.
+  // Absent: as the points show.
+  std::optional<double> noise;
+  // A promise: the manifold's reach is at least this length. A mesh of exact points may then be
+  // proved.
+  std::optional<double> reach;
+  double drop = 0.001;  // the share of the points that may be left out
+  bool closed = true;   // false: it may have a boundary, and the mesh ends where the points end
+
+  Connection connection;  // without a server: a private one, as of MeshOptions
+  std::function<void(const Progress&)> on_progress;  // called on the calling thread
+  std::stop_token stop;                              // cancels: kStopped
+  std::string label;                                 // shown in the server's lists and logs
+};
+
+// Makes a mesh of points on a manifold, or near it, d x n. They are its vertices, by their columns;
+// Report::reconstruction says what became of them. `tangents`, (d k) x n, where they are known: of
+// each point k orthonormal vectors, entry i*k + a being coordinate i of vector a.
+//
+//   const auto mesh = stellate::Reconstruct(points, {.dimension = 2});
+//
+// Returns a mesh whenever the run ends by itself, certified or not. kRefused: a point or an option
+// is wrong, and is named.
+Expected<Mesh> Reconstruct(const Eigen::MatrixXd& points, const ReconstructOptions& options,
+                           const Eigen::MatrixXd& tangents = {});
+
+}  // namespace stellate

@@ -1,0 +1,212 @@
+#include "stellate/reconstruct.h"
+
+#include <google/protobuf/empty.pb.h>
+#include <openssl/evp.h>
+
+#include <algorithm>
+#include <bit>
+#include <chrono>
+#include <memory>
+#include <utility>
+
+#include "net/channel.h"
+#include "net/embedded_server.h"
+#include "net/reconnect.h"
+#include "stellate/download.h"
+#include "stellate/v1/stellate.grpc.pb.h"
+#include "wire/status.h"
+
+namespace stellate {
+namespace client {
+namespace {
+
+static_assert(std::endian::native == std::endian::little, "points are sent as they lie in memory");
+
+constexpr Eigen::Index kPartBytes = Eigen::Index{1} << 20;
+constexpr auto kFarewell = std::chrono::seconds(5);
+
+std::string Sha256(const Eigen::MatrixXd& matrix) {
+  std::string digest(EVP_MAX_MD_SIZE, '\0');
+  unsigned size = 0;
+  EVP_Digest(matrix.data(), static_cast<std::size_t>(matrix.size()) * sizeof(double),
+             reinterpret_cast<unsigned char*>(digest.data()), &size, EVP_sha256(), nullptr);
+  digest.resize(size);
+  return digest;
+}
+
+v1::PointsChunk Named(const std::string& mesh) {
+  v1::PointsChunk chunk;
+  chunk.set_mesh(mesh);
+  return chunk;
+}
+
+// A mesh of points, from its declaration to its last point. Deletes the mesh when it goes.
+class Upload {
+ public:
+  Upload(const std::shared_ptr<grpc::Channel>& channel, const Eigen::MatrixXd& points,
+         const Eigen::MatrixXd& tangents, const ReconstructOptions& options,
+         std::function<bool()> hopeless)
+      : stub_(v1::Stellate::NewStub(channel)),
+        points_(points),
+        tangents_(tangents),
+        options_(options),
+        attempts_({options.connection.reconnect, channel, std::move(hopeless),
+                   options.connection.on_outage}) {}
+
+  ~Upload() {
+    if (name_.empty()) return;
+    grpc::ClientContext context;
+    context.set_deadline(std::chrono::system_clock::now() + kFarewell);
+    v1::DeleteMeshRequest request;
+    request.set_name(name_);
+    google::protobuf::Empty ignored;
+    stub_->DeleteMesh(&context, request, &ignored);
+  }
+
+  // Returns the mesh's name, once the server has all points.
+  Expected<std::string> Go() {
+    const std::stop_callback cancel(options_.stop, [this] { attempts_.Stop(); });
+    if (auto ok = Declare(); !ok) return tl::unexpected(ok.error());
+    grpc::Status status;
+    do {
+      v1::ReconstructReply reply;
+      status = Send({Named(name_)}, &reply);
+      if (!status.ok()) continue;
+      attempts_.Heard();
+      status = SendRest(static_cast<Eigen::Index>(reply.rows()));
+      if (status.ok()) return name_;
+    } while (attempts_.Again(status));
+    if (options_.stop.stop_requested()) {
+      return Fail(ErrorCode::kStopped, "the reconstruction was cancelled");
+    }
+    return tl::unexpected(attempts_.Lost(status));
+  }
+
+ private:
+  // Not tried again: a server that cannot be reached in the first place is an error at once.
+  Expected<void> Declare() {
+    v1::PointsChunk chunk;
+    v1::Reconstruction* const spec = chunk.mutable_spec();
+    spec->set_dimension(static_cast<std::uint32_t>(std::max(options_.dimension, 0)));
+    spec->set_ambient_dimension(static_cast<std::uint32_t>(points_.rows()));
+    spec->set_points(static_cast<std::uint64_t>(points_.cols()));
+    spec->set_tangents(tangents_.size() > 0);
+    if (options_.noise) spec->set_noise(*options_.noise);
+    if (options_.reach) spec->set_declared_reach(*options_.reach);
+    spec->set_drop(options_.drop);
+    spec->set_open(!options_.closed);
+    spec->set_label(options_.label);
+    v1::ReconstructReply reply;
+    const grpc::Status status = Send({chunk}, &reply, kCallTime);
+    if (!status.ok()) return tl::unexpected(FromStatus(status));
+    name_ = reply.mesh().name();
+    return {};
+  }
+
+  grpc::Status Send(const std::vector<v1::PointsChunk>& chunks, v1::ReconstructReply* reply,
+                    std::chrono::milliseconds limit = {}) {
+    grpc::ClientContext& context = attempts_.Attempt();
+    if (limit.count() > 0) context.set_deadline(std::chrono::system_clock::now() + limit);
+    const auto stream = stub_->Reconstruct(&context, reply);
+    for (const v1::PointsChunk& chunk : chunks) {
+      if (!stream->Write(chunk)) return stream->Finish();
+    }
+    stream->WritesDone();
+    return stream->Finish();
+  }
+
+  // From a row on, and the end.
+  grpc::Status SendRest(Eigen::Index first) {
+    v1::ReconstructReply reply;
+    const auto stream = stub_->Reconstruct(&attempts_.Attempt(), &reply);
+    if (!stream->Write(Named(name_))) return stream->Finish();
+    const Eigen::Index numbers = points_.rows() + tangents_.rows();
+    const Eigen::Index rows = std::max<Eigen::Index>(
+        kPartBytes / (numbers * static_cast<Eigen::Index>(sizeof(double))), 1);
+    for (; first < points_.cols(); first += rows) {
+      const Eigen::Index count = std::min(rows, points_.cols() - first);
+      v1::PointsChunk chunk;
+      chunk.mutable_points()->set_first_row(static_cast<std::uint64_t>(first));
+      Fill(points_, first, count, {points_.rows()}, chunk.mutable_points()->mutable_points());
+      if (tangents_.size() > 0) {
+        Fill(tangents_, first, count, {points_.rows(), options_.dimension},
+             chunk.mutable_points()->mutable_tangents());
+      }
+      if (!stream->Write(chunk)) return stream->Finish();
+      Tell(first + count);
+    }
+    v1::PointsChunk end;
+    end.mutable_end()->set_points_sha256(Sha256(points_));
+    if (tangents_.size() > 0) end.mutable_end()->set_tangents_sha256(Sha256(tangents_));
+    if (stream->Write(end)) stream->WritesDone();
+    return stream->Finish();
+  }
+
+  static void Fill(const Eigen::MatrixXd& matrix, Eigen::Index first, Eigen::Index count,
+                   std::initializer_list<Eigen::Index> shape, v1::Array* array) {
+    array->add_shape(static_cast<std::uint32_t>(count));
+    for (const Eigen::Index extent : shape) array->add_shape(static_cast<std::uint32_t>(extent));
+    array->set_data(matrix.col(first).data(),
+                    static_cast<std::size_t>(matrix.rows() * count) * sizeof(double));
+  }
+
+  void Tell(Eigen::Index rows) const {
+    if (!options_.on_progress) return;
+    Progress progress;
+    progress.phase = Phase::kSeeding;
+    progress.vertices = static_cast<std::uint64_t>(rows);
+    options_.on_progress(progress);
+  }
+
+  const std::unique_ptr<v1::Stellate::Stub> stub_;
+  const Eigen::MatrixXd& points_;
+  const Eigen::MatrixXd& tangents_;
+  const ReconstructOptions& options_;
+  Reconnector attempts_;
+  std::string name_;
+};
+
+Expected<void> Check(const Eigen::MatrixXd& points, const ReconstructOptions& options,
+                     const Eigen::MatrixXd& tangents) {
+  for (Eigen::Index row = 0; row < points.cols(); ++row) {
+    if (points.col(row).allFinite()) continue;
+    return Fail(ErrorCode::kRefused,
+                "point " + std::to_string(row) + " has a coordinate that is not finite");
+  }
+  const bool fits = tangents.size() == 0 || (tangents.cols() == points.cols() &&
+                                             tangents.rows() == points.rows() * options.dimension);
+  if (!fits)
+    return Fail(ErrorCode::kRefused, "tangents are not (d k) x n, as the points are d x n");
+  return {};
+}
+
+}  // namespace
+}  // namespace client
+
+Expected<Mesh> Reconstruct(const Eigen::MatrixXd& points, const ReconstructOptions& options,
+                           const Eigen::MatrixXd& tangents) {
+  if (auto ok = client::Check(points, options, tangents); !ok) return tl::unexpected(ok.error());
+  std::unique_ptr<client::EmbeddedServer> embedded;
+  DownloadOptions download;
+  download.connection = options.connection;
+  if (options.connection.server.empty()) {
+    auto started = client::EmbeddedServer::Start();
+    if (!started) return tl::unexpected(started.error());
+    embedded = std::move(*started);
+    download.connection.server = embedded->address();
+    download.connection.credentials = {};
+    download.connection.keepalive = client::kNoPings;
+  }
+  const auto channel = client::Connect(download.connection);
+  if (!channel) return tl::unexpected(channel.error());
+  client::Upload upload(*channel, points, tangents, options,
+                        [&embedded] { return embedded && !embedded->alive(); });
+  const Expected<std::string> name = upload.Go();
+  if (!name) return tl::unexpected(name.error());
+  download.unfinished = Unfinished::kWait;
+  download.on_progress = options.on_progress;
+  download.stop = options.stop;
+  return DownloadMesh(*name, download);
+}
+
+}  // namespace stellate

@@ -1,0 +1,84 @@
+"""`stellate reconstruct`, as a user's shell runs it."""
+
+import json
+import pathlib
+import subprocess
+
+import numpy as np
+import pytest
+import samples
+import stellate
+import topology
+
+STELLATE = pathlib.Path(stellate.server.find_stellated()).parent / "stellate"
+
+
+def reconstruct(*arguments, given=None, cwd):
+    command = [STELLATE, "reconstruct", *map(str, arguments)]
+    return subprocess.run(
+        command, input=given, capture_output=True, text=True, cwd=cwd, timeout=300
+    )
+
+
+@pytest.fixture
+def torus(rng, tmp_path):
+    points = samples.torus(rng)
+    np.savetxt(tmp_path / "torus.xyz", points, "%.17g")
+    return points
+
+
+def test_a_file_becomes_a_mesh(torus, tmp_path):
+    done = reconstruct(
+        "torus.xyz", "-k", 2, "-o", "t.txt", "-o", "t.ply", "--report", "r.json", cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    assert "CERTIFIED" in done.stdout
+    mesh = stellate.load_txt(tmp_path / "t.txt")
+    assert mesh.points.tobytes() == torus.tobytes()
+    topology.assert_closed_manifold(mesh, 0, [1, 2, 1])
+    python = stellate.reconstruct(torus, 2)
+    assert mesh.simplices.tobytes() == python.simplices.tobytes()
+    report = json.loads((tmp_path / "r.json").read_text())
+    assert report["reconstruction"] == python.report.to_dict()["reconstruction"]
+
+
+def test_standard_input_and_more_columns(torus, tmp_path):
+    rows = "\n".join(f"{x:.17g} {y:.17g} {z:.17g} 7" for x, y, z in torus)
+    done = reconstruct("-", "-k", 2, "--ambient", 3, "--json", given=rows, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["certificate"]["certified"]
+
+
+def test_what_is_not_certified_is_written_and_exits_with_1(torus, tmp_path):
+    np.save(tmp_path / "half.npy", torus[torus[:, 0] > 0])
+    done = reconstruct("half.npy", "-k", 2, "-o", "half.txt", cwd=tmp_path)
+    assert done.returncode == 1
+    assert "NOT CERTIFIED" in done.stdout and "EDGE" in done.stdout
+    assert (tmp_path / "half.txt").exists()
+
+
+@pytest.mark.parametrize(
+    "arguments, given, words",
+    [
+        (["-"], "1 2 3\n", "--dimension is required"),
+        (["-", "-k", "2"], "1 2 3\n4 5\n", "line 2: has 2 numbers, and line 1 has 3"),
+        (["-", "-k", "2"], "1 2 3\n4 nan 5\n", "line 2: 'nan' is no finite number"),
+        (["-", "-k", "2"], "", "standard input cannot be read as points: it has no points"),
+        (["-", "-k", "3"], "1 2 3\n" * 9, "dimension (k) is 3 and ambient_dimension (d) is 3"),
+        (["-", "-k", "1"], "1 2\n", "points is 1"),
+        (["missing.ply", "-k", "2"], None, "it is not there"),
+        (["-", "-k", "2", "--ambient", "4"], "1 2 3\n", "4 are asked for"),
+        (["-", "-k", "2", "-o", "a.stl"], "1 2 3 4\n", "stl"),
+        (["-", "-k", "1", "--drop", "2"], "1 2\n" * 9, "drop is 2"),
+    ],
+)
+def test_mistakes_are_named_and_exit_with_2(arguments, given, words, tmp_path):
+    done = reconstruct(*arguments, given=given, cwd=tmp_path)
+    assert done.returncode == 2, done
+    assert words in done.stderr
+
+
+def test_help_says_what_there_is(tmp_path):
+    said = reconstruct("--help", cwd=tmp_path).stdout
+    for option in ("--ambient", "--noise", "--reach", "--drop", "--open", "--server", "--report"):
+        assert option in said
