@@ -83,7 +83,7 @@ class Upload {
   }
 
  private:
-  // Not tried again: a server that cannot be reached in the first place is an error at once.
+  // Not tried again: a server that cannot be reached in the first place is an error immediately.
   Expected<void> Declare() {
     v1::PointsChunk chunk;
     v1::Reconstruction* const spec = chunk.mutable_spec();
