@@ -113,22 +113,27 @@ void AddTopology(const v1::Certificate& c, Entries* entries) {
                                 " normal flats met wrongly"));
 }
 
-void AddMeasures(const v1::Certificate& c, Entries* entries) {
+// `of_points`: a reconstruction, which asked no oracle for barycentres and was given no epsilon.
+void AddMeasures(const v1::Certificate& c, bool of_points, Entries* entries) {
   std::string shape =
       Message("largest circumradius ", Digits(c.max_circumradius(), 4), ", radius-edge ratio ",
               Digits(c.max_radius_edge(), 3), "; smallest fatness ", Digits(c.min_fatness(), 3));
   if (c.min_angle_degrees() > 0)
     shape += Message(", angle ", Digits(c.min_angle_degrees(), 1, true), " degrees");
   entries->Add("shape", shape);
-  entries->Add("closeness", Message("barycentres within ", Digits(c.max_barycentre_distance(), 3),
-                                    " of the manifold, simplices within ",
+  const std::string barycentres =
+      of_points ? ""
+                : Message("barycentres within ", Digits(c.max_barycentre_distance(), 3),
+                          " of the manifold, ");
+  entries->Add("closeness", Message(barycentres, "simplices within ",
                                     Digits(c.max_tangent_angle_degrees(), 1, true),
                                     " degrees of its tangent spaces"));
   // What was refused may be far too coarse to tell the reach.
-  entries->Add("reach",
-               Message(c.certified() ? "about " : "at most ", Digits(c.estimated_reach(), 4),
-                       ", epsilon is ", Digits(c.epsilon_over_reach(), 3), " of it",
-                       c.certified() ? "" : " or more"));
+  entries->Add(
+      "reach",
+      Message(c.certified() ? "about " : "at most ", Digits(c.estimated_reach(), 4),
+              of_points ? ", the largest circumradius is " : ", epsilon is ",
+              Digits(c.epsilon_over_reach(), 3), " of it", c.certified() ? "" : " or more"));
   if (c.declared_reach() <= 0) return;
   std::string proved = ": nothing proved from it";
   if (c.reach_refuted()) {
@@ -221,7 +226,7 @@ std::string ReportText(const v1::Report& report) {
   entries.Add("certificate", Judgement(c));
   if (c.components() > 0) {
     AddTopology(c, &entries);
-    AddMeasures(c, &entries);
+    AddMeasures(c, report.has_reconstruction(), &entries);
     AddRegions(c, &entries);
   }
   for (const std::string& warning : c.warnings()) entries.Add("warning", warning);
