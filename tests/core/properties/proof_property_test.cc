@@ -125,6 +125,9 @@ TEST(Proofs, AreNeverWrong) {
       case CertificateLevel::kSampled:
         ++tally.sampled;
         break;
+      case CertificateLevel::kDecided:
+        ADD_FAILURE() << "a level of reconstructions alone";
+        break;
       case CertificateLevel::kRefused:
         ++(c.reach_refuted ? tally.refuted : tally.refused);
         break;
