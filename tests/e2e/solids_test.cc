@@ -20,7 +20,7 @@
 #include "stellate/download.h"
 #include "stellate/serve.h"
 
-namespace stellate::testing {
+namespace stellate::testing::compositions {
 namespace {
 
 using Eigen::Vector3d;
@@ -246,4 +246,4 @@ TEST_F(CommandLine, TheDoctorAndWorkersTakeSolids) {
 }
 
 }  // namespace
-}  // namespace stellate::testing
+}  // namespace stellate::testing::compositions
