@@ -9,6 +9,7 @@
 #include "core/base/message.h"
 #include "core/base/vector_ops.h"
 #include "core/batch.h"
+#include "core/field_status.h"
 #include "core/reconstruction/reconstructor.h"
 #include "core/specification.h"
 
@@ -17,16 +18,6 @@ namespace {
 
 constexpr double kMostDropped = 0.5;
 constexpr Eigen::Index kMostPoints = 0x7fffffff;  // ids above are taken
-
-Status Invalid(std::string field, std::string message) {
-  return {StatusCode::kInvalidArgument, std::move(message), std::move(field)};
-}
-
-Status TooLarge(std::string field, std::string message) {
-  return {StatusCode::kLimitExceeded, std::move(message), std::move(field)};
-}
-
-bool IsLength(double value) { return value >= kMinLength && value <= kMaxLength; }
 
 Status CheckDimensions(int k, int d) {
   if (k < 1)

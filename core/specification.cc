@@ -7,22 +7,13 @@
 #include <string>
 
 #include "core/base/message.h"
+#include "core/field_status.h"
 #include "core/label_table.h"
 #include "core/list_walls.h"
 
 namespace stellate::core {
 namespace {
 
-Status Invalid(std::string field, std::string message) {
-  return {StatusCode::kInvalidArgument, std::move(message), std::move(field)};
-}
-
-Status TooLarge(std::string field, std::string message) {
-  return {StatusCode::kLimitExceeded, std::move(message), std::move(field)};
-}
-
-// False for NaN too.
-bool IsLength(double value) { return value >= kMinLength && value <= kMaxLength; }
 bool IsCoordinate(double value) { return std::abs(value) <= kMaxLength; }
 
 std::string LengthRule() { return Message("a length between ", kMinLength, " and ", kMaxLength); }

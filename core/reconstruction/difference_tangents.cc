@@ -49,7 +49,7 @@ DifferenceTangents FindDifferenceTangents(const FittedCloud& cloud,
   DifferenceTangents result;
   result.tangents = cloud.tangents;
   std::vector<double> bounds(cloud.size, 0.0);
-  const auto numbers = static_cast<std::size_t>(cloud.k * cloud.d);
+  const auto numbers = static_cast<std::size_t>(cloud.k) * static_cast<std::size_t>(cloud.d);
   ParallelFor(cloud.size, [&](std::uint32_t p) {
     if (asked[p]) bounds[p] = FindBest(cloud, p, result.tangents.data() + p * numbers);
   });

@@ -98,7 +98,7 @@ class CloudFitter {
     if (cloud_.any_smoothed) {
       std::vector<double> moved = SmoothOnce();
       done(0.7);
-      if (cloud_.any_smoothed) SmoothAgain(std::move(moved));
+      if (cloud_.any_smoothed) SmoothAgain(moved);
     }
     for (auto* values : {&cloud_.noise, &cloud_.spacing, &cloud_.kurtosis})
       for (int pass = 0; pass < 2; ++pass) Even(values);
@@ -107,7 +107,9 @@ class CloudFitter {
   }
 
  private:
-  std::size_t numbers() const { return static_cast<std::size_t>(cloud_.k * cloud_.d); }
+  std::size_t numbers() const {
+    return static_cast<std::size_t>(cloud_.k) * static_cast<std::size_t>(cloud_.d);
+  }
   int Count(int times) const {
     return std::min<int>(times * QuadricFit::Terms(cloud_.k) + 1, static_cast<int>(cloud_.size));
   }
@@ -214,7 +216,7 @@ class CloudFitter {
     *values = std::move(medians);
   }
 
-  void SmoothAgain(std::vector<double> moved) {
+  void SmoothAgain(const std::vector<double>& moved) {
     cloud_.positions = Smooth(moved, [&](std::uint32_t p, Neighbours, const QuadricFit& fit) {
       std::copy(fit.tangent().begin(), fit.tangent().end(), cloud_.tangents.data() + p * numbers());
     });

@@ -409,6 +409,7 @@ std::vector<std::uint32_t> AddWeights(const FittedCloud& cloud,
                                       std::vector<double>* weights) {
   WeightSearch<K> search(cloud, ids, *weights);
   std::vector<std::uint32_t> own;
+  own.reserve(centres.size());
   for (const std::uint32_t p : centres)
     own.push_back(
         static_cast<std::uint32_t>(std::lower_bound(ids.begin(), ids.end(), p) - ids.begin()));
