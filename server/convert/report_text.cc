@@ -94,26 +94,32 @@ std::string Judgement(const v1::Certificate& c) {
   return verdict.empty() ? std::string(mark) : Message(mark, ": ", verdict);
 }
 
-void AddTopology(const v1::Certificate& c, Entries* entries) {
+// `of_points`, as below: a reconstruction, which asked no oracle and was given no epsilon.
+void AddTopology(const v1::Certificate& c, bool of_points, Entries* entries) {
   entries->Add("topology", Message(c.components() == 1 ? "1 component"
                                                        : Grouped(c.components()) + " components",
                                    ", Euler characteristic ", c.euler_characteristic(),
                                    c.orientable() ? ", orientable" : ", not orientable"));
-  const std::string closed =
-      c.closed() ? "closed" : Message("not closed (", Grouped(c.bad_faces()), " bad faces)");
-  const std::string links = c.links_are_spheres()
-                                ? Message("every link a sphere (decided ",
-                                          c.links_decided_exactly() ? "exactly)" : "by homology)")
-                                : Grouped(c.bad_links()) + " links are not spheres";
+  const bool ends = c.faces_size() > 0;  // the manifold, at its boundary
+  const std::string closed = !c.closed()
+                                 ? Message("not closed (", Grouped(c.bad_faces()), " bad faces)")
+                             : ends ? "closed up to its boundary"
+                                    : "closed";
+  const std::string links =
+      c.links_are_spheres() ? Message("every link a sphere ", ends ? "or a ball " : "", "(decided ",
+                                      c.links_decided_exactly() ? "exactly)" : "by homology)")
+                            : Grouped(c.bad_links()) + " links are not spheres";
   entries->Add("manifold", Message(closed, "; ", links));
-  if (c.certified() && c.fibre_samples() == 0) return;  // of a boundary alone none is looked at
-  entries->Add("stars", Message(Grouped(c.inconsistent_simplices()), " inconsistent simplices, ",
-                                Grouped(c.unembedded_stars()), " stars overlap, ",
-                                Grouped(c.fibre_failures()), " of ", Grouped(c.fibre_samples()),
-                                " normal flats met wrongly"));
+  // Of a boundary alone stars are not looked at, and of points no flats.
+  if (c.certified() && c.fibre_samples() == 0 && !of_points) return;
+  std::string stars = Message(Grouped(c.inconsistent_simplices()), " inconsistent simplices, ",
+                              Grouped(c.unembedded_stars()), " stars overlap");
+  if (c.fibre_samples() > 0)
+    stars += Message(", ", Grouped(c.fibre_failures()), " of ", Grouped(c.fibre_samples()),
+                     " normal flats met wrongly");
+  entries->Add("stars", stars);
 }
 
-// `of_points`: a reconstruction, which asked no oracle for barycentres and was given no epsilon.
 void AddMeasures(const v1::Certificate& c, bool of_points, Entries* entries) {
   std::string shape =
       Message("largest circumradius ", Digits(c.max_circumradius(), 4), ", radius-edge ratio ",
@@ -225,7 +231,7 @@ std::string ReportText(const v1::Report& report) {
   }
   entries.Add("certificate", Judgement(c));
   if (c.components() > 0) {
-    AddTopology(c, &entries);
+    AddTopology(c, report.has_reconstruction(), &entries);
     AddMeasures(c, report.has_reconstruction(), &entries);
     AddRegions(c, &entries);
   }

@@ -26,6 +26,7 @@ v1::Report Good() {
   c.set_closed(true);
   c.set_links_are_spheres(true);
   c.set_components(1);
+  c.set_fibre_samples(240);
   c.set_euler_characteristic(-8);
   c.set_max_circumradius(0.123456);
   c.set_min_angle_degrees(20.26);
@@ -45,13 +46,32 @@ TEST(ReportText, IsAsAllClientsShowIt) {
   certificate  CERTIFIED: every check holds.
      topology  1 component, Euler characteristic -8, not orientable
      manifold  closed; every link a sphere (decided by homology)
-        stars  0 inconsistent simplices, 0 stars overlap, 0 of 0 normal flats met wrongly
+        stars  0 inconsistent simplices, 0 stars overlap, 0 of 240 normal flats met wrongly
         shape  largest circumradius 0.1235, radius-edge ratio 0; smallest fatness 0, angle 20.3
                degrees
     closeness  barycentres within 0 of the manifold, simplices within 0.0 degrees of its tangent
                spaces
         reach  about inf, epsilon is 0 of it
 )");
+}
+
+TEST(ReportText, SaysOfPointsWhatWasMeasuredAlone) {
+  v1::Report report = Good();
+  report.mutable_reconstruction()->set_spacing(0.5);
+  report.mutable_certificate()->set_fibre_samples(0);
+  report.mutable_certificate()->set_epsilon_over_reach(0.25);
+  const std::string text = ReportText(report);
+  EXPECT_TRUE(Says(text, "0 stars overlap\n")) << text;
+  EXPECT_FALSE(Says(text, "normal flats")) << text;
+  EXPECT_FALSE(Says(text, "barycentres")) << text;
+  EXPECT_TRUE(Says(text, "the largest circumradius is 0.25 of it")) << text;
+}
+
+TEST(ReportText, SaysThatAManifoldEnds) {
+  v1::Report report = Good();
+  report.mutable_certificate()->add_faces()->add_walls(0);
+  EXPECT_TRUE(
+      Says(ReportText(report), "closed up to its boundary; every link a sphere or a ball "));
 }
 
 TEST(ReportText, SaysWhetherItIsCertified) {
