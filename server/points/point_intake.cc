@@ -39,8 +39,8 @@ Status CheckTangents(const PointsPart& part, int d, int k) {
 
 }  // namespace
 
-PointIntake::PointIntake(PointsRequest request, Clock::duration patience)
-    : request_(std::move(request)), patience_(patience) {}
+PointIntake::PointIntake(const PointsRequest& request, Clock::duration patience)
+    : request_(request), patience_(patience) {}
 
 Status PointIntake::Join(std::shared_ptr<PointStream> stream) {
   std::shared_ptr<PointStream> older, welcome;

@@ -55,7 +55,7 @@ struct PointDigests {
 class PointIntake {
  public:
   // `patience`: how long Ask waits without a stream.
-  PointIntake(PointsRequest request, Clock::duration patience);
+  PointIntake(const PointsRequest& request, Clock::duration patience);
 
   // Gives the mesh's upload to this stream, and ends one of before. It may
   // proceed once the mesh's replay is over. kFailedPrecondition: the mesh is over.

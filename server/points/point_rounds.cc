@@ -20,9 +20,9 @@ constexpr double kUploadShare = 0.2;
 
 }  // namespace
 
-PointRounds::PointRounds(PointsRequest request, core::ReconstructionWatch* watch,
+PointRounds::PointRounds(const PointsRequest& request, core::ReconstructionWatch* watch,
                          PointPlaces* places)
-    : request_(std::move(request)), watch_(watch), places_(places) {
+    : request_(request), watch_(watch), places_(places) {
   specification_.dimension = request_.spec.dimension;
   specification_.ambient_dimension = request_.spec.ambient_dimension;
   const auto n = static_cast<Index>(request_.points);

@@ -23,7 +23,7 @@ class PointRounds final : public core::Mesher {
  public:
   // `watch` and `places` outlive it; any thread may read the progress of `watch`. The last Absorb
   // fills `places`.
-  PointRounds(PointsRequest request, core::ReconstructionWatch* watch, PointPlaces* places);
+  PointRounds(const PointsRequest& request, core::ReconstructionWatch* watch, PointPlaces* places);
 
   std::shared_ptr<const core::QueryBatch> NextBatch() override;
   core::Expected<core::MeshDelta> Absorb(const core::Answers& answers) override;

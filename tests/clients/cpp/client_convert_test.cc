@@ -356,7 +356,7 @@ TEST(DeltaMesh, LabelsStayWithTheirSimplices) {
   ASSERT_TRUE(
       builder->Absorb(labelled(Delta(2, 4, none, {0, 3, 1, 2}, {0, 1, 1, 2}), std::string{4, 5})));
   EXPECT_EQ(builder->Take()->labels, (std::vector<std::uint8_t>{4, 5, 3}));
-  EXPECT_FALSE(builder->Absorb(labelled(Delta(3, 4, none, {0, 1}, {}), std::string{1, 1})));
+  EXPECT_FALSE(builder->Absorb(labelled(Delta(3, 4, none, {0, 1}, {}), std::string{1, 1, 1})));
   auto plain = DeltaMesh::Create(1, 2);
   ASSERT_TRUE(plain->Absorb(Delta(1, 0, points, {0, 1}, {})));
   EXPECT_TRUE(plain->Take()->labels.empty());
