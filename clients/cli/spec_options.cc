@@ -1,6 +1,7 @@
 #include "spec_options.h"
 
 #include <CLI/CLI.hpp>
+#include <cmath>
 #include <cstdint>
 #include <type_traits>
 
@@ -66,7 +67,7 @@ void SpecOptions::SetEpsilon(const std::string& text) {
     options.epsilon = kAuto;
     return;
   }
-  if (CLI::detail::lexical_cast(text, options.epsilon)) return;
+  if (CLI::detail::lexical_cast(text, options.epsilon) && std::isfinite(options.epsilon)) return;
   throw CLI::ValidationError("--epsilon", "has to be a length or auto, and is '" + text + "'");
 }
 

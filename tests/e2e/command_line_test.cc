@@ -78,7 +78,8 @@ TEST_F(CommandLine, UncertifiedMeshExitsOne) {
 TEST_F(CommandLine, UsageAndRefusalsExitTwo) {
   for (const std::string arguments :
        {"", "frobnicate", "mesh", "mesh torus", "mesh torus --epsilon", "mesh torus -e x",
-        "mesh klein -e 1", "mesh torus -e 0.1 --no-such-flag"}) {
+        "mesh torus -e -inf", "mesh torus -e nan", "mesh klein -e 1",
+        "mesh torus -e 0.1 --no-such-flag"}) {
     const Result result = Run(arguments);
     EXPECT_EQ(result.status, 2) << arguments << ": " << result.output;
     EXPECT_NE(result.output, "");

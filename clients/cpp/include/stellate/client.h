@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -15,8 +16,8 @@
 namespace stellate {
 
 // MeshOptions::epsilon: let ChooseEpsilon choose. If the mesh is too coarse to be certified, mesh
-// again, twice at most, with what its certificate shows.
-inline constexpr double kAuto = -1;
+// again, twice at most, with what its certificate shows. No length: a length of -1 is refused.
+inline constexpr double kAuto = -std::numeric_limits<double>::infinity();
 
 // What to mesh and how. Absent values take the server's defaults; see mesh.proto for each.
 struct MeshOptions {
