@@ -11,9 +11,10 @@
 points, `stellate.reconstruct` makes the mesh of them.
 
 What fewer need is in modules of its own: `stellate.executors`, an oracle on many processes and
-machines; `stellate.pulling`, on a thread of yours alone; `stellate.client`, a server call by call;
-`stellate.server`, where it is looked for; `stellate.viewer`, meshes that grow in a browser;
-`stellate.options` and `stellate.report`, all that a mesh is asked for and says.
+machines; `stellate.pulling`, on a thread of yours alone; `stellate.learning`, a mesh of points by
+scikit-learn's conventions; `stellate.client`, a server call by call; `stellate.server`, where it is
+looked for; `stellate.viewer`, meshes that grow in a browser; `stellate.options` and
+`stellate.report`, all that a mesh is asked for and says.
 """
 
 from . import _requirements, _stubs
@@ -24,6 +25,7 @@ _stubs.ensure()  # before anything imports them
 from . import client as client  # noqa: E402
 from . import errors as errors  # noqa: E402
 from . import executors as executors  # noqa: E402
+from . import learning as learning  # noqa: E402
 from . import manifolds, oracles  # noqa: E402
 from . import options as options  # noqa: E402
 from . import progress as progress  # noqa: E402

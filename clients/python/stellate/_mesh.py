@@ -10,10 +10,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import _convert, _faces, _html, _measures, _plot, _slice, viewer
+from . import _convert, _faces, _html, _locate, _measures, _plot, _slice, viewer
 from ._faces import Face
 from ._files import formats
 from ._files.orientation import orient, turn_outwards, turn_positive
+from ._locate import Located
 from ._measures import Curvature
 from ._wire.orientation import Orientation
 from .errors import InvalidArgument, UncertifiedWarning
@@ -225,6 +226,28 @@ class Mesh:
         Raises: InvalidArgument for other manifolds.
         """
         return _measures.curvature(self, oracle)
+
+    def laplacian(self) -> tuple[Any, Any]:
+        """The stiffness and the lumped mass of linear finite elements, sparse (n, n); needs scipy.
+
+            stiffness, mass = mesh.laplacian()  # of u: minus its Laplacian is mass^-1 stiffness u
+
+        Of any dimension and codimension; its eigenvalues are M's to O(epsilon^2). Points in no simplex
+        have empty rows.
+
+        Raises: InvalidArgument where a simplex is flat, and without scipy.
+        """
+        return _locate.laplacian(self)
+
+    def locate(self, points: Any) -> Located:
+        """The nearest points of the mesh to (q, d) given ones; needs scipy.
+
+        Returns: `simplices` (q,), `weights` (q, k+1), `points` (q, d), `distances` (q,). A function with
+          `values` at the mesh's points has there
+          `(found.weights * values[mesh.simplices[found.simplices]]).sum(axis=1)`.
+        Raises: InvalidArgument.
+        """
+        return _locate.locate(self, points)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Writes the mesh in the format that the file name's ending says.

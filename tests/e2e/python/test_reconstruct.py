@@ -437,3 +437,30 @@ def test_owners_have_limits_of_their_own(tmp_path, torus):
         anne.delete(held.name)
         for client in clients:
             client.close()
+
+
+def test_an_estimator(torus, server):
+    surface = stellate.learning.Reconstructor(noise=0, server=server)
+    with pytest.raises(stellate.FailedPrecondition, match="fit"):
+        surface.locate(torus)
+    assert surface.fit(torus) is surface
+    assert surface.mesh_.certified and surface.n_features_in_ == 3
+    assert surface.places_.tolist() == surface.mesh_.places.tolist()
+    # Off the mesh by a little: linear functions are interpolated to what they are below.
+    off = torus[:50] + 1e-3
+    found = surface.locate(off)
+    assert found.distances.max() <= 1e-3 * np.sqrt(3) + 1e-12
+    both = surface.interpolate(torus, off)
+    assert both.shape == (50, 3) and np.abs(both - found.points).max() < 1e-12
+    assert surface.interpolate(torus[:, 2], off) == pytest.approx(found.points[:, 2])
+    with pytest.raises(stellate.InvalidArgument, match="3000 points|values have the shape"):
+        surface.interpolate(torus[:7, 2], off)
+
+
+def test_an_estimator_is_cloned_by_its_parameters():
+    one = stellate.learning.Reconstructor(3, drop=0.01, reach=0.4)
+    other = stellate.learning.Reconstructor(**one.get_params()).set_params(drop=0.02)
+    assert other.get_params() == {**one.get_params(), "drop": 0.02}
+    assert "drop=0.02" in repr(other)
+    with pytest.raises(stellate.InvalidArgument, match="'epsilon'"):
+        other.set_params(epsilon=0.1)

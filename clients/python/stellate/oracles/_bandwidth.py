@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .._point_sets import tree_of
 from .._rows import Array, product, transposed
 from ..errors import InvalidArgument
-from ._common import tree_of
 
 _ROUNDS = 12  # of bandwidths from noise, and noise from fits of these bandwidths
 _SETTLED = 0.02  # a share: no round that changes them by less is followed by another

@@ -7,10 +7,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from .._point_sets import as_points, tree_of
 from .._rows import Array, Flags, apply, norms, product, transposed
 from ..errors import InvalidArgument
 from ._bandwidth import Fits, by_density, insist_on_flatness, noise_aware
-from ._common import Projection, as_points, box_around, tree_of
+from ._common import Projection, box_around
 
 _ITERATIONS = 100
 _SHORTEST_MOVE = 1e-11  # a step, in bandwidths

@@ -1,12 +1,10 @@
-"""What the ready oracles share: points, boxes, trees."""
+"""What the ready oracles share."""
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from .._rows import Array, Flags, norms, unmasked
+from .._rows import Array, Flags, norms
 from ..errors import InvalidArgument, NotConverged
 from ..oracle import CheckedOracle
 
@@ -63,41 +61,6 @@ class Projection:
         _, bases, found = self._project(np.asarray(points, dtype=np.float64))
         bases[~found] = np.eye(self.ambient_dimension, self.dimension)
         return bases
-
-
-def tree_of(points: Array) -> Any:
-    """A tree of points; needs scipy.
-
-    Raises: InvalidArgument, saying how to get it.
-    """
-    try:
-        from scipy.spatial import cKDTree
-    except ImportError:
-        raise InvalidArgument(
-            "this oracle searches with scipy's tree, and there is no scipy: "
-            "apt-get install python3-scipy, or pip install scipy"
-        ) from None
-    return cKDTree(points)
-
-
-def as_points(points: Any, what: str) -> Array:
-    """(n, d), finite, of at least one row.
-
-    Raises: InvalidArgument.
-    """
-    try:
-        array = np.array(unmasked(points), dtype=np.float64)
-    except (TypeError, ValueError):
-        array = np.empty(0)
-    if array.ndim != 2 or not array.size:
-        raise InvalidArgument(f"{what} have to be an array (n, d), and are {np.shape(points)}")
-    bad = ~np.isfinite(array).all(axis=1)
-    if bad.any():
-        raise InvalidArgument(
-            f"{what}: row {int(np.argmax(bad))} is not finite, or masked, and so are "
-            f"{np.count_nonzero(bad):,} of {len(array):,} in all. Leave out rows that hold no point"
-        )
-    return array
 
 
 def box_around(points: Array, share: float) -> tuple[Array, Array]:

@@ -6,10 +6,11 @@ from typing import Any, Literal
 
 import numpy as np
 
+from .._point_sets import as_points, tree_of
 from .._rows import Array, Flags, apply, norms, product, transposed
 from ..errors import InvalidArgument
 from ..oracle import CheckedOracle
-from ._common import all_or_raise, as_points, tree_of, where_of
+from ._common import all_or_raise, where_of
 from ._walls import Clipped
 
 Keep = Literal["box", "seeds"]

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from .._point_sets import as_points, tree_of
 from .._rows import Array, Flags, apply, norms, product, transposed
 from ..errors import InvalidArgument
 from ._chart import Chart, Map
-from ._common import Projection, as_points, box_around, tree_of
+from ._common import Projection, box_around
 
 _SAMPLES = 20_000  # of all charts together, to begin from
 _NEAREST = 8  # of them looked at for each query

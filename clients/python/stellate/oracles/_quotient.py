@@ -9,10 +9,11 @@ import numpy as np
 
 from .._functions import Exactness, UserFunction
 from .._lowest import descend
+from .._point_sets import tree_of
 from .._rows import Array, Flags, apply, norms, product, transposed
 from ..errors import InvalidArgument
 from ..oracle import CheckedOracle
-from ._common import about_of, all_or_raise, box_around, refuse_walls, tree_of
+from ._common import about_of, all_or_raise, box_around, refuse_walls
 
 _SAMPLES = 20_000  # of the manifold, to begin from
 _NEAREST = 8  # of them looked at for each query

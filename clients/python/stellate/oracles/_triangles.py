@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from .._point_sets import as_points
 from .._rows import Array, norms
 from ..errors import InvalidArgument
 from ._cloud import PointCloud
-from ._common import as_points
 
 _MOST_POINTS = 5_000_000
 # For meshio to begin on a busy machine, and to read: ten times what its slowest formats take.
