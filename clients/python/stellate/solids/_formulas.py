@@ -89,10 +89,17 @@ def make(op: str, *args: Node) -> Node:
             return constant(0)
         if 1 in values:
             return args[1] if values[0] == 1 else args[0]
+        if args[0] is args[1]:
+            return make("square", args[0])
     if op == "divide" and (values[0] == 0 or values[1] == 1):
         return args[0]
-    if op == "power" and values[1] in (1, 2):
-        return args[0] if values[1] == 1 else make("square", args[0])
+    if op == "power" and values[1] in (0.5, 1, 2):
+        return args[0] if values[1] == 1 else make("square" if values[1] == 2 else "sqrt", args[0])
+    # Norms of one component, which others are frozen to: they keep their sign, as norms do not.
+    if op == "sqrt" and args[0].op == "square":
+        return make("absolute", *args[0].args)
+    if op == "hypot" and 0 in values:
+        return make("absolute", args[1] if values[0] == 0 else args[0])
     if op == "negative" and args[0].op == "negative":
         return args[0].args[0]
     if op in ("maximum", "minimum") and args[0] is args[1]:
@@ -207,7 +214,7 @@ def _slopes(node: Node) -> list[Node | None]:
         return [make("sign", args[0])]
     if node.op in ("maximum", "minimum"):
         which = node.selector()
-        return [make("where", which, one, zero), make("where", which, zero, one)]
+        return [make("either", which, one, zero), make("either", which, zero, one)]
     if node.op == "where":
         return [None, make("where", args[0], one, zero), make("where", args[0], zero, one)]
     return [None] * len(args)  # of constants, and of signs
@@ -258,8 +265,14 @@ def _where(selector: Any, first: Any, other: Any) -> Any:
     return np.where(selector > 0, first, other)
 
 
+def _either(selector: Any, first: Any, other: Any) -> Any:
+    """Half of each where the selector is 0, and a derivative neither: max(t, 0) is not flat there."""
+    return np.where(selector == 0, 0.5 * (first + other), _where(selector, first, other))
+
+
 _FUNCTIONS: dict[str, Callable[..., Any]] = {
     **{name: getattr(np, name) for name in (*SMOOTH, "maximum", "minimum", "absolute", "sign")},
     "half_inverse": _half_inverse,
     "where": _where,
+    "either": _either,
 }

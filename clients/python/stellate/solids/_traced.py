@@ -196,7 +196,8 @@ class _Search:
         selectors = [branch.selector() for branch in branches]
         chosen = Program(selectors)(self._just_inside) > 0
         creased = [k for k in range(len(branches)) if self._has_crease(selectors[k], chosen[:, k])]
-        self._add_pieces(branches, chosen, creased)
+        self._begin_pieces(branches, chosen, creased)
+        self._tell_apart(branches, chosen, creased)
         if len(self._pieces) > _MOST_PIECES:
             raise InvalidArgument(
                 f"the function has {len(self._pieces)} smooth pieces, and there may be {_MOST_PIECES}"
@@ -214,6 +215,28 @@ class _Search:
             codes, labels = self._labels()
         return self._made(labels)
 
+    def _begin_pieces(self, branches: list[Node], chosen: Flags, creased: list[int]) -> None:
+        """The pieces between some branches, to which those are added that are in their way."""
+        while True:
+            self._add_pieces(branches, chosen, creased)
+            more = [k for k in self._in_the_way(branches) if k not in creased]
+            if not more:
+                return
+            creased += more
+
+    def _tell_apart(self, branches: list[Node], chosen: Flags, creased: list[int]) -> None:
+        """Makes walls each of the places where a piece is zero, where it does not tell what is between
+        them: of the branches within pieces those that leave the fewest wrong labels."""
+        while before := self._impure(*self._labels()):
+            trials = [(before, creased)]
+            for k in self._branches_of(branches, *self._pieces):
+                self._add_pieces(branches, chosen, [*creased, k])
+                trials.append((self._impure(*self._labels()), [*creased, k]))
+            after, creased = min(trials, key=lambda trial: trial[0])
+            self._begin_pieces(branches, chosen, creased)
+            if after == before:
+                return
+
     # Branches that matter.
 
     def _has_crease(self, selector: Node, chosen: Flags) -> bool:
@@ -228,39 +251,74 @@ class _Search:
         steep = norms(slopes[1](self._just_inside))
         away = np.divide(values[:, 1], steep, out=np.full(len(steep), np.inf), where=steep > 0)
         places = self._onto(both, slopes, self._just_inside[np.argsort(away)[:_STARTS]])
+        return self._jumps(places, *slopes)
+
+    def _jumps(self, places: Array, slope: Program, across: Program) -> bool:
+        """Whether a gradient is another one on the other side of the places, in the direction across."""
+        direction = across(places)
+        steep = norms(direction)
+        places, direction = places[steep > 0], direction[steep > 0] / steep[steep > 0, None]
         if not len(places):
             return False
-        across = slopes[1](places)
-        usable = norms(across) > 0
-        places, across = places[usable], across[usable]
-        if not len(places):
-            return False
-        aside = _ASIDE * self._size * across / norms(across)[:, None]
-        one, other = slopes[0](places + aside), slopes[0](places - aside)
+        aside = _ASIDE * self._size * direction
+        one, other = slope(places + aside), slope(places - aside)
         sizes = np.maximum(norms(one), norms(other))
         jumps = norms(one - other) > _CREASE * np.where(sizes > 0, sizes, 1.0)
         return bool(jumps.mean() > _SHARE)
 
-    def _onto(self, both: Program, slopes: list[Program], points: Array) -> Array:
-        """Newton's method to where both formulas are zero, from points near; those that came there."""
+    def _onto(self, zeros: Program, slopes: list[Program], points: Array) -> Array:
+        """Newton's method to where all formulas are zero, from points near; those that came there."""
         x = points
         for _ in range(_STEPS):
             matrix = np.stack([slope(x) for slope in slopes], axis=1)
             gram = product(matrix, transposed(matrix))
-            gram += 1e-12 * np.trace(gram, axis1=1, axis2=2)[:, None, None] * np.eye(2) + 1e-300
+            small = 1e-12 * np.trace(gram, axis1=1, axis2=2)[:, None, None]
+            gram += small * np.eye(len(slopes)) + 1e-300
             try:
-                step = np.linalg.solve(gram, both(x)[..., None])[..., 0]
+                step = np.linalg.solve(gram, zeros(x)[..., None])[..., 0]
             except np.linalg.LinAlgError:
                 break
             move = np.nan_to_num(apply(transposed(matrix), step))
             far = 0.05 * self._size / np.maximum(norms(move), 1e-300)
             x = x - move * np.minimum(1.0, far)[:, None]
-        zero = (np.abs(both(x)) <= 1e-9 * max(self._usual, 1e-300)).all(axis=1)
+        zero = (np.abs(zeros(x)) <= 1e-9 * max(self._usual, 1e-300)).all(axis=1)
         return x[zero & self._in_box(x)]
+
+    def _in_the_way(self, branches: list[Node]) -> list[int]:
+        """Branches within pieces, with which these cannot be walls.
+
+        Those of two pieces that are zero on the same part of the surface, where other parts of it keep
+        them different: the upper sides of two slabs in one plane. And those with a crease that is on
+        the surface in a corner alone: a pyramid's four sides, by two absolute values.
+        """
+        inner = [set(self._branches_of(branches, piece)) for piece in self._pieces]
+        values = np.abs(Program(self._pieces)(self._just_inside))
+        zero = values <= _ROUNDING * self._usual
+        shared = zero[zero.sum(axis=1) > 1].any(axis=0)
+        found = {k for i in np.flatnonzero(shared) for k in inner[i]}
+        for i, piece in enumerate(self._pieces):
+            for k in inner[i] - found:
+                if self._ends_in_a_corner(piece, branches[k].selector(), values[:, i]):
+                    found.add(k)
+        return sorted(found)
+
+    def _branches_of(self, branches: list[Node], *pieces: Node) -> list[int]:
+        """Which branches there are in pieces."""
+        inner = {id(n) for n in formulas.in_order(pieces) if n.op in BRANCHES}
+        return [k for k, branch in enumerate(branches) if id(branch) in inner]
+
+    def _ends_in_a_corner(self, piece: Node, selector: Node, values: Array) -> bool:
+        """Whether the piece has a crease by the selector where the surface is."""
+        three = [piece, selector, self._root]
+        slopes = [Program(formulas.gradient(node, self._d)) for node in three]
+        near = values + np.abs(Program([selector])(self._just_inside)[:, 0])
+        starts = self._just_inside[np.argsort(near)[:_STARTS]]
+        return self._jumps(self._onto(Program(three), slopes, starts), *slopes[:2])
 
     # Pieces.
 
     def _add_pieces(self, branches: list[Node], chosen: Flags, creased: list[int]) -> None:
+        self._pieces, self._signs = [], []
         groups, which = np.unique(chosen[:, creased], axis=0, return_inverse=True)
         which = np.ravel(which)
         members: dict[int, tuple[Node, list[int]]] = {}
@@ -274,23 +332,45 @@ class _Search:
             like = self._like(piece, [node for node, _ in members.values()])
             key = id(piece) if like is None else id(like)
             members.setdefault(key, (piece, []))[1].extend(rows)
+        # A distance to a box is a norm outside of it, and not inside: the zero set is where these
+        # branches change.
+        steep = Program(formulas.gradient(self._root, self._d))(self._just_inside)
+        away = _ASIDE * self._size * steep / np.maximum(norms(steep), 1e-300)[:, None]
+        beyond = self._just_inside - away
+        changes = (Program([branch.selector() for branch in branches])(beyond) > 0) != chosen
         for piece, rows in sorted(members.values(), key=lambda m: -len(m[1])):
-            self._take(self._extended(piece, rows))
+            for part in self._crossed(piece, np.array(rows), beyond, changes):
+                self._take(self._extended(piece, part))
 
-    def _extended(self, piece: Node, rows: list[int]) -> Node:
+    def _crossed(self, piece: Node, rows: Any, beyond: Array, changes: Flags) -> list[Any]:
+        """The rows in parts, so that the piece, extended by each, is negative beyond the zero set there.
+
+        A norm is not, where other parts need it as such: -norm of what is frozen to one component
+        here, and to several there.
+        """
+        lost = Program([self._extended(piece, rows)])(beyond[rows])[:, 0] > 0
+        if not lost.any():
+            return [rows]
+        _, which = np.unique(changes[rows[lost]], axis=0, return_inverse=True)
+        apart = [rows[lost][np.ravel(which) == i] for i in range(int(np.max(which)) + 1)]
+        return ([] if lost.all() else [rows[~lost]]) + sorted(apart, key=len, reverse=True)
+
+    def _extended(self, piece: Node, rows: Any) -> Node:
         """The piece with those choices for good that are the same wherever it is needed.
 
         Where it is not needed it is smooth then, too, as far as can be: Newton's method and
         differences see both sides of an edge.
         """
-        inner = [n for n in formulas.in_order([piece]) if n.op in BRANCHES]
-        if not inner:
-            return piece
-        chosen = Program([n.selector() for n in inner])(self._just_inside[rows]) > 0
-        same = (chosen == chosen[0]).all(axis=0)
-        return formulas.frozen(
-            piece, {id(n): bool(c) for n, c, s in zip(inner, chosen[0], same) if s}
-        )
+        while True:
+            inner = [n for n in formulas.in_order([piece]) if n.op in BRANCHES]
+            if not inner:
+                return piece
+            chosen = Program([n.selector() for n in inner])(self._just_inside[rows]) > 0
+            same = (chosen == chosen[0]).all(axis=0)
+            if not same.any():
+                return piece
+            choices = {id(n): bool(c) for n, c, s in zip(inner, chosen[0], same) if s}
+            piece = formulas.frozen(piece, choices)  # where norms of one component may be left
 
     def _take(self, piece: Node) -> None:
         if self._like(piece, self._pieces) is None:
@@ -298,14 +378,17 @@ class _Search:
             self._signs.append(Program([piece])(self._points)[:, 0] > 0)
 
     def _like(self, piece: Node, others: list[Node]) -> Node | None:
-        """One of the others that has the same values, or their opposites."""
+        """One of the others that has the same values, or these times a number."""
+        if any(node is piece for node in others):
+            return piece
         some = self._points[:200]
         values = Program([piece, *others])(some).T
         for node, theirs in zip(others, values[1:]):
-            for sign in (1.0, -1.0):
-                close = np.isclose(values[0], sign * theirs, rtol=1e-9, atol=1e-12 * self._usual)
-                if close.all():
-                    return node
+            square = theirs @ theirs
+            times = values[0] @ theirs / square if square > 0 else 0.0
+            close = np.isclose(values[0], times * theirs, rtol=1e-9, atol=1e-12 * self._usual)
+            if times != 0 and close.all():
+                return node
         return None
 
     # Labels.

@@ -114,7 +114,9 @@ class Symbols(np.lib.mixins.NDArrayOperatorsMixin):
     def __array__(self, *unused: Any, **more: Any) -> Any:
         raise InvalidArgument(
             "the function makes an array of numbers of its argument, by numpy.array, asarray or a "
-            "function that is not numpy's: leave that out, or compute with numpy alone"
+            "function that is not numpy's: leave that out, or compute with numpy alone. A list of them is "
+            "one to numpy.max and numpy.maximum.reduce: take numpy.stack(...).max(axis=1), or "
+            "functools.reduce(numpy.maximum, ...)"
         )
 
     def copy(self) -> Symbols:
