@@ -5,6 +5,7 @@
 Reads a line of JSON for each mesh wanted, {"shape": NAME, "epsilon": E, ...}; writes its name once
 it is declared, and "over" when it is done. "wait": for one more line before it is begun. "hold": for
 one more line once the oracle has answered for so many points. "cancel": it before it is begun.
+"points" instead of "shape": it is reconstructed from them.
 """
 
 from __future__ import annotations
@@ -20,6 +21,8 @@ sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "clients" /
 
 import stellate  # noqa: E402
 from stellate import manifolds, oracles  # noqa: E402
+from stellate import solids as s  # noqa: E402
+from stellate._points import CheckedPoints  # noqa: E402
 
 
 class TwoSpheres:
@@ -65,14 +68,41 @@ SHAPES = {
     "octant": lambda: oracles.Clipped(
         manifolds.Sphere(2), box=([0.0, 0.0, 0.0], [np.inf, np.inf, np.inf])
     ),
+    "grain": lambda: s.Labels(matrix=s.Box([-1] * 3, [1] * 3), grain=s.Ball(0.6)),
     "cube": lambda: oracles.Solid([], ([-1.3] * 3, [1.3] * 3), box=([-1.0] * 3, [1.0] * 3)),
 }
+
+
+def cap(n: int) -> np.ndarray:
+    """Points of a sphere, which end at a circle."""
+    i = np.arange(n) + 0.5
+    z, turn = 1 - 1.2 * i / n, i * np.pi * (3 - np.sqrt(5))
+    around = np.sqrt(1 - z**2)
+    return np.stack([around * np.cos(turn), around * np.sin(turn), z], axis=1)
+
+
+POINTS = {"cap": lambda: cap(800)}
+
+
+def reconstruct(client: stellate.Client, points: np.ndarray, **options: object) -> None:
+    limits = {"label": options["label"]}
+    checked = CheckedPoints(points, 2, None, 0, None, 0.0, True, {}, **limits)
+    name = client.declare_points(checked).name
+    print(name, flush=True)
+    client.upload(name, checked).run()
+    for event in client.watch(name, progress_only=True):
+        if event.WhichOneof("event") == "final":
+            break
+    print("over", flush=True)
 
 
 def main() -> None:
     client = stellate.Client(sys.argv[1])
     for line in sys.stdin:
         wish = json.loads(line)
+        if "points" in wish:
+            reconstruct(client, POINTS[wish.pop("points")](), **wish)
+            continue
         oracle = SHAPES[wish.pop("shape")]()
         hold = wish.pop("hold", None)
         wait = wish.pop("wait", False)

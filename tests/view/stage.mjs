@@ -176,6 +176,20 @@ export async function freePort() {
 // colours, a digest by which two pictures are told apart, the sides of what is seen, how far down it
 // comes, 0 to 1; and of what mesh that is, as the page says.
 function lookOn() {
+  window.hues = () => {
+    const canvas = document.getElementById("canvas");
+    const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext("2d");
+    copy.drawImage(canvas, 0, 0);
+    const { data } = copy.getImageData(0, 0, canvas.width, canvas.height);
+    let [blue, yellow] = [0, 0];
+    for (let i = 0; i < data.length; i += 4) {
+      const [r, , b] = data.subarray(i, i + 3);
+      if (b > r + 30) blue++;
+      if (r > b + 50) yellow++;
+    }
+    const all = data.length / 4;
+    return { blue: blue / all, yellow: yellow / all };
+  };
   window.glance = () => {
     const canvas = document.getElementById("canvas");
     const [width, height] = [200, Math.round((200 * canvas.height) / canvas.width)];
@@ -222,6 +236,12 @@ function lookOn() {
     const ground = [...data.subarray(0, 3)];
     return { ground, share, parts, colours, digest, sides, lowest, revision, vertices, simplices };
   };
+}
+
+// Shares of the canvas that are blue and that are yellow or orange, once what was asked for is there.
+export async function hues(page) {
+  await still(page);
+  return page.evaluate(() => window.hues());
 }
 
 // Of what moves by itself.

@@ -5,7 +5,7 @@ import http from "node:http";
 import { join } from "node:path";
 import { test } from "node:test";
 import { pathToFileURL } from "node:url";
-import { finished, freePort, glance, picture, setStage, shown, until } from "./stage.mjs";
+import { finished, freePort, glance, hues, picture, setStage, shown, until } from "./stage.mjs";
 import { choose, walk } from "./walk.mjs";
 
 const stage = setStage();
@@ -99,6 +99,58 @@ test("a mesh grows before one's eyes, and goes on with the gateway's successor",
   assert.match(await text(page, "#verdict"), /Components\s+2/);
   assert.equal(late.simplices, 2 * late.vertices - 8, "no simplex came twice or was lost");
   await until(page, () => document.getElementById("connection").textContent === "");
+});
+
+test("regions and the boundary alone are told by colour", async () => {
+  await stage.mesh({ shape: "grain", epsilon: 0.25, label: "two materials" });
+  await stage.mesh({ shape: "grain", epsilon: 0.25, boundary_only: true, label: "its boundary" });
+  const page = await stage.look();
+  await choose(page, "two materials");
+  await finished(page);
+  assert.equal(await page.locator("#colour").inputValue(), "region");
+  assert.equal(await page.locator("#part").inputValue(), "below", "what is inside is seen");
+  const legend = await page.locator("#walls span").allInnerTexts();
+  assert.deepEqual(legend, ["region 1", "region 2"]);
+  const regions = await hues(page);
+  assert.ok(regions.blue > 0.05 && regions.yellow > 0.01, JSON.stringify(regions));
+  await page.locator("#part").selectOption("slice");
+  const slice = await hues(page);
+  assert.ok(slice.blue > 0.05 && slice.yellow > 0.01, JSON.stringify(slice));
+  await page.locator("#part").selectOption("boundary");
+  assert.ok((await hues(page)).yellow < 0.001, "the grain is within");
+  await page.locator("#colour").selectOption("wall");
+  assert.equal(await page.locator("#walls span").count(), 7);
+
+  await choose(page, "its boundary");
+  await finished(page);
+  assert.match(await text(page, "#facts"), /2 in R³/);
+  assert.equal(await page.locator("#part").inputValue(), "whole");
+  assert.ok((await hues(page)).blue > 0.05);
+  assert.equal(
+    await page.locator("#verdict li.fails").count(),
+    0,
+    "what is certified fails nothing",
+  );
+  const plain = await picture(page);
+  await page.locator("#colour").selectOption("wall");
+  assert.notEqual((await picture(page)).digest, plain.digest, "its walls are told apart");
+});
+
+test("a reconstruction shows what became of its points", async () => {
+  await stage.mesh({ points: "cap", label: "a cap" });
+  const page = await stage.look();
+  await choose(page, "a cap");
+  await finished(page);
+  await until(page, () => document.querySelector('#colour option[value="place"]') !== null);
+  await page.locator("#colour").selectOption("place");
+  await until(page, () => document.querySelectorAll("#walls span").length >= 2);
+  const legend = await page.locator("#walls span").allInnerTexts();
+  assert.ok(legend.includes("ok") && legend.includes("edge"), legend.join());
+  const right = await text(page, "#right");
+  assert.doesNotMatch(right, /epsilon|break a rule/i, "points have none");
+  await until(page, () => window.hues().yellow > 0.0005, undefined);
+  await page.locator("#colour").selectOption("plain");
+  assert.ok((await hues(page)).yellow < 0.0005, "the colour is that of the edge");
 });
 
 test("meshes with boundary show where they end, by wall", async () => {

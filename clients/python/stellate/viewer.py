@@ -13,19 +13,21 @@ import signal
 import subprocess
 import tempfile
 import webbrowser
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ._complex import Complex
 from ._credentials import Credentials
 from ._generated import geometry_pb2 as geometry
 from ._generated import mesh_pb2 as pb
 from ._generated import stellate_pb2 as calls
-from ._wire import arrays
+from ._wire import arrays, enums
 from .errors import Unavailable, ViewerNotFound
 from .report import Report
 from .server import Server, find_stellated
+
+if TYPE_CHECKING:
+    from ._mesh import Mesh
 
 __all__ = ["LiveView"]
 
@@ -92,7 +94,7 @@ def _report(report: Report) -> pb.Report:
     return message
 
 
-def _status(mesh: Complex, label: str) -> pb.Mesh:
+def _status(mesh: Mesh, label: str) -> pb.Mesh:
     status = pb.Mesh(name="meshes/here", revision=1)
     status.spec.dimension = mesh.dimension
     status.spec.ambient_dimension = mesh.ambient_dimension
@@ -111,7 +113,23 @@ def _status(mesh: Complex, label: str) -> pb.Mesh:
     return status
 
 
-def page_of(mesh: Complex, label: str = "") -> str:
+def _download(mesh: Mesh, status: pb.Mesh) -> calls.DownloadMeshResponse:
+    """What became of the points of a reconstruction, which a download has alone."""
+    status.spec.reconstruction.points = len(mesh.points)
+    code_of = {enums.place(number): number for number in pb.Place.values()}
+    codes = [code_of[name] for name in np.asarray(mesh.places).tolist()]
+    for code in np.unique(codes).tolist():
+        status.report.reconstruction.places.add(place=code, points=codes.count(code))
+    return calls.DownloadMeshResponse(
+        revision=status.revision,
+        vertices=len(codes),
+        simplices=len(mesh.simplices),
+        places=pb.Places(codes=bytes(codes)),
+        complete=True,
+    )
+
+
+def page_of(mesh: Mesh, label: str = "") -> str:
     """The viewer's page with this mesh in it, whole: HTML that needs no server and no network."""
     status = _status(mesh, label)
     delta = pb.MeshDelta(
@@ -124,11 +142,19 @@ def page_of(mesh: Complex, label: str = "") -> str:
         (ends,) = np.nonzero(mesh.walls)
         delta.boundary_vertices.extend(ends.tolist())
         delta.boundary_walls.extend(mesh.walls[ends].tolist())
+    if mesh.labels is not None:
+        delta.added_labels = mesh.labels.astype(np.uint8).tobytes()
+        status.spec.labels = bytes(np.unique(mesh.labels).astype(np.uint8))
+        if mesh.is_boundary:
+            status.spec.boundary_only = True
+            status.spec.dimension += 1  # the solid's
     grown = calls.WatchMeshResponse(delta=calls.DeltaChunk(delta=delta, complete=True))
     replies: dict[str, list[Any]] = {
         "WatchMesh": [grown, calls.WatchMeshResponse(final=status)],
         "GetMesh": [status],
     }
+    if mesh.places is not None:
+        replies["DownloadMesh"] = [_download(mesh, status)]
     recording = {
         "replies": [
             {
@@ -163,9 +189,7 @@ class Frame:
         )
 
 
-def show(
-    mesh: Complex, path: str | os.PathLike[str] | None, label: str, height: int
-) -> Frame | None:
+def show(mesh: Mesh, path: str | os.PathLike[str] | None, label: str, height: int) -> Frame | None:
     """See Mesh.show."""
     page = page_of(mesh, label)
     if path is not None:

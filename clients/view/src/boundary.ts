@@ -4,6 +4,7 @@ import type { MeshStore } from "./store";
 
 export interface Boundary {
   triangles: number[]; // ids
+  cells: number[]; // of each of them, the simplex that it is a side of
   segments: number[]; // of surfaces all of the boundary, else where walls meet
   points: number[]; // ends and corners
   facets: number; // all (k-1)-faces
@@ -13,9 +14,17 @@ export interface Boundary {
 interface Face {
   ids: number[];
   walls: bigint; // that all of it lies on
+  cell: number; // one that it is of
 }
 
-const kNone: Boundary = { triangles: [], segments: [], points: [], facets: 0, parts: 0 };
+const kNone: Boundary = {
+  triangles: [],
+  cells: [],
+  segments: [],
+  points: [],
+  facets: 0,
+  parts: 0,
+};
 
 function wallsOf(store: MeshStore, ids: number[]): bigint {
   return ids.reduce((walls, id) => walls & (store.walls.get(id) ?? 0n), ~0n);
@@ -45,7 +54,7 @@ function facetsInOne(store: MeshStore): Face[] {
       const ids = without(cell, omit);
       const walls = wallsOf(store, ids);
       const key = ids.join(" ");
-      if (walls !== 0n && !once.delete(key)) once.set(key, { ids, walls });
+      if (walls !== 0n && !once.delete(key)) once.set(key, { ids, walls, cell: at / width });
     }
   }
   return [...once.values()];
@@ -54,11 +63,11 @@ function facetsInOne(store: MeshStore): Face[] {
 // Of faces' own faces those that lie on more walls than a face that has them.
 function ridges(store: MeshStore, faces: Face[]): Face[] {
   const found = new Map<string, Face>();
-  for (const { ids, walls } of faces) {
+  for (const { ids, walls, cell } of faces) {
     for (let omit = 0; omit < ids.length; omit++) {
       const inner = without(ids, omit);
       const more = wallsOf(store, inner);
-      if (more !== walls) found.set(inner.join(" "), { ids: inner, walls: more });
+      if (more !== walls) found.set(inner.join(" "), { ids: inner, walls: more, cell });
     }
   }
   return [...found.values()];
@@ -91,11 +100,33 @@ function countParts(faces: Face[]): number {
 
 function find(store: MeshStore): Boundary {
   if (store.walls.size === 0) return kNone;
+  if (store.isBoundary) return creases(store);
   let faces = facetsInOne(store);
   const found = { ...kNone, facets: faces.length, parts: countParts(faces) };
   for (let size = store.k; size > 0; size--) {
     const ids = faces.flatMap((face) => face.ids);
-    if (size === 3) found.triangles = ids;
+    if (size === 3) {
+      found.triangles = ids;
+      found.cells = faces.map((face) => face.cell);
+    }
+    if (size === 2) found.segments = ids;
+    if (size === 1) found.points = ids;
+    faces = ridges(store, faces);
+  }
+  return found;
+}
+
+// A boundary alone does not end; where walls meet, it has creases and corners.
+function creases(store: MeshStore): Boundary {
+  const width = store.k + 1;
+  const cells = Array.from({ length: store.simplices }, (_, cell) => {
+    const ids = [...store.cells.subarray(cell * width, (cell + 1) * width)];
+    return { ids, walls: wallsOf(store, ids), cell };
+  });
+  const found = { ...kNone };
+  let faces = ridges(store, cells);
+  for (let size = store.k; size > 0; size--) {
+    const ids = faces.flatMap((face) => face.ids);
     if (size === 2) found.segments = ids;
     if (size === 1) found.points = ids;
     faces = ridges(store, faces);

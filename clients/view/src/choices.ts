@@ -41,19 +41,23 @@ function partsOf(k: number, solid: boolean): Option[] {
   ];
 }
 
-export function choicesOf({ k, d, walls }: MeshRow): Choices {
-  const solid = k === 3 && walls > 0;
+export function choicesOf({ k, d, walls, regions, boundaryOnly, places }: MeshRow): Choices {
+  const solid = k === 3 && walls > 0 && !boundaryOnly;
+  const several = regions.length > 1;
   const parts = partsOf(k, solid);
   const colours: Option[] = [
     ["plain", "plain"],
-    ...(solid ? [["wall", "wall"] as Option] : []),
+    ...(several ? [["region", "region"] as Option] : []),
+    ...(solid || boundaryOnly ? [["wall", "wall"] as Option] : []),
+    ...(places.length > 0 ? [["place", "what became of it"] as Option] : []),
     ["order", "order of coming"],
     ["size", "circumradius"],
     ...(k > 1 ? [["shape", "thinness"] as Option] : []),
     ...coordinates(d),
   ];
   // What lies over itself when coordinates are left out does so less from an oblique side.
-  const part = parts[0][0] as Part;
+  // Of several regions those inside are to be seen, too.
+  const part: Part = several && solid ? "below" : (parts[0][0] as Part);
   const axis = Math.min(3, d - 1); // along an axis of the picture a slice would be seen edge on
   const seen = part === "slice" ? d - 1 : d; // dimensions of what holds what is seen
   const oblique = seen > 3;
@@ -66,7 +70,15 @@ export function choicesOf({ k, d, walls }: MeshRow): Choices {
     part,
     axis,
     level: 0.5,
-    colour: solid ? "wall" : oblique ? "coordinate" : "plain",
+    colour: several
+      ? "region"
+      : solid || boundaryOnly
+        ? "wall"
+        : places.some((place) => place > 0)
+          ? "place"
+          : oblique
+            ? "coordinate"
+            : "plain",
     colourAxis,
   };
   return { parts, colours, first, oblique };

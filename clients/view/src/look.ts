@@ -1,7 +1,8 @@
 // What is to be seen of a mesh: by which axes, which part, coloured by what.
 
 export type Part = "whole" | "slice" | "below" | "boundary";
-export type Colour = "plain" | "order" | "coordinate" | "size" | "shape" | "wall";
+export type Colour =
+  "plain" | "order" | "coordinate" | "size" | "shape" | "wall" | "region" | "place";
 
 export interface Look {
   frame: number[]; // 3 x d, orthonormal rows: what is right, up and near
@@ -12,11 +13,14 @@ export interface Look {
   colourAxis: number;
 }
 
+// What a value says: 0..1 on the colour map, or the number of a wall, a region or a place.
+export type Palette = "map" | "wall" | "region" | "place";
+
 export interface Shape {
   kind: "triangles" | "segments";
   positions: Float32Array; // 3 a vertex
-  values: Float32Array; // of each vertex, 0..1, or its wall's number; NaN: plain
-  byWall: boolean;
+  values: Float32Array; // of each vertex, as the palette says; NaN: plain
+  palette: Palette;
   index: Uint32Array | null;
 }
 
@@ -31,7 +35,8 @@ export interface Rim {
 // Vertices in no simplex, as all are at first.
 export interface Bare {
   positions: Float32Array; // 3 a vertex
-  values: Float32Array; // 0..1: when it came
+  values: Float32Array; // 0..1: when it came; or its place
+  palette: Palette;
 }
 
 const kWalls = [
@@ -45,6 +50,41 @@ const kWalls = [
   "#4f46e5",
 ];
 export const wallColour = (wall: number) => kWalls[wall % kWalls.length];
+
+// Paler than those of walls, whose curves are seen on them.
+const kRegions = [
+  "#8fb3e8",
+  "#f2c078",
+  "#93cfa4",
+  "#e3a1c4",
+  "#b3a4e6",
+  "#86cfcb",
+  "#d9a58a",
+  "#c7cf7e",
+];
+export const regionColour = (label: number) =>
+  kRegions[(label + kRegions.length - 1) % kRegions.length];
+
+// What became of the points of a reconstruction, as Place of the protocol numbers them. What is in the
+// mesh is cool, what was left out grey, what is at fault warm.
+export const kPlaces: { name: string; colour: string }[] = [
+  { name: "ok", colour: "#8fb3e8" },
+  { name: "merged", colour: "#7a8494" },
+  { name: "dropped", colour: "#4b5563" },
+  { name: "tiled", colour: "#2a9d8f" },
+  { name: "weighted", colour: "#7c3aed" },
+  { name: "edge", colour: "#f59e0b" },
+  { name: "sheets", colour: "#db2777" },
+  { name: "noise", colour: "#a16207" },
+  { name: "sparse", colour: "#dc2626" },
+  { name: "close", colour: "#ea580c" },
+  { name: "disagree", colour: "#7f1d1d" },
+];
+
+export function paletteColour(palette: Exclude<Palette, "map">, value: number): string {
+  if (palette === "wall") return wallColour(value);
+  return palette === "region" ? regionColour(value) : (kPlaces[value] ?? kPlaces[0]).colour;
+}
 
 // The coordinates' own axes, chosen by hand.
 export function axesFrame(d: number, axes: number[]): number[] {

@@ -10,7 +10,7 @@ import {
   drawWorkers,
   drawList,
   drawVerdict,
-  drawWalls,
+  drawLegend,
   element,
   grouped,
   seconds,
@@ -146,7 +146,7 @@ function fill(id: string, options: [value: string, text: string][], value: strin
 
 // How a mesh of this kind is best seen at first.
 function meet(row: MeshRow) {
-  const { parts, colours, first, oblique } = choicesOf(row);
+  const { parts, first, oblique } = choicesOf(row);
   look = first;
   stopTour();
   view.stand(row.d);
@@ -156,7 +156,7 @@ function meet(row: MeshRow) {
   at("part-box").hidden = parts.length === 1;
   at("wires-box").hidden = row.k === 1;
   fill("axis", coordinates(row.d), `${look.axis}`);
-  fill("colour", colours, look.colour === "coordinate" ? `${look.colourAxis}` : look.colour);
+  fillColours(row);
   [0, 1, 2].forEach((axis) =>
     fill(
       `axis-${axis}`,
@@ -165,7 +165,6 @@ function meet(row: MeshRow) {
     ),
   );
   at("axes-box").hidden = row.d <= 3;
-  drawWalls(at("walls"), row.k <= 3 ? row.walls : 0);
   setParts();
   askToSee({ type: "look", name: chosen, look });
 }
@@ -175,7 +174,15 @@ function stopTour() {
   at<HTMLInputElement>("tour").checked = false;
 }
 
+// What it can be coloured by, of which there is more once it is over.
+function fillColours(row: MeshRow) {
+  const { colour, colourAxis } = look;
+  fill("colour", choicesOf(row).colours, colour === "coordinate" ? `${colourAxis}` : colour);
+  drawLegend(at("walls"), row, look);
+}
+
 function setParts() {
+  if (mesh) drawLegend(at("walls"), mesh, look);
   const whole = look.part === "whole" || look.part === "boundary";
   at("axis-box").hidden = at("level-box").hidden = whole;
 }
@@ -265,10 +272,10 @@ function drawFacts() {
     element("b", "", mesh.label || shortName(mesh.name)),
     badgeOf(mesh),
     fact("dimension", `${mesh.k} in R${superscript(mesh.d)}`),
-    fact("epsilon", `${Number(mesh.epsilon.toPrecision(4))}`),
+    ...(mesh.ofPoints ? [] : [fact("epsilon", `${Number(mesh.epsilon.toPrecision(4))}`)]),
     fact("vertices", grouped(mesh.vertices)),
     fact("simplices", grouped(mesh.simplices)),
-    fact("queries", grouped(mesh.queries)),
+    ...(mesh.ofPoints ? [] : [fact("queries", grouped(mesh.queries))]),
     fact("round", grouped(mesh.round)),
   ];
   if (boundary) items.push(fact("boundary", boundary));
@@ -306,16 +313,17 @@ const hear: { [T in FromWorker["type"]]: (m: Extract<FromWorker, { type: T }>) =
     if (!chosen) note("No mesh yet");
   },
   mesh: (message) => {
-    const first = mesh === null;
+    const before = mesh;
     mesh = message.mesh;
-    if (first) meet(mesh);
+    if (before === null) meet(mesh);
+    else if (before.places.length !== mesh.places.length) fillColours(mesh);
     drawFacts();
     time.hear(mesh.revision, mesh.over);
     leader.hear(mesh);
     if (time.shown === 0) note(emptyOf(mesh));
   },
   past: ({ rows }) => {
-    curves.show(rows);
+    curves.show(mesh?.ofPoints ? [] : rows); // no rule is asked of points
     time.hear(rows.at(-1)?.revision ?? 0);
   },
   workers: ({ rows }) => {

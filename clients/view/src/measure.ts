@@ -137,14 +137,15 @@ class Binned {
 // Volume of the regular k-simplex over the k-th power of its edge, times k!: the fattest there is.
 export const fattest = (k: number) => Math.sqrt((k + 1) / 2 ** k);
 
-export function histograms(store: MeshStore, epsilon: number): Histogram[] {
+// Circumradii as shares of `most`, which is called `name`.
+export function histograms(store: MeshStore, most: number, name: string): Histogram[] {
   const { k } = store;
-  const size = new Binned("circumradius / epsilon", "", 0, 1);
+  const size = new Binned(`circumradius / ${name}`, "", 0, 1);
   if (k === 1) {
     const simplices = new Simplices(store);
     for (let cell = 0; cell < store.simplices; cell++) {
       simplices.measure(cell);
-      size.add(simplices.radius / epsilon);
+      size.add(simplices.radius / most);
     }
     return [size.result()];
   }
@@ -154,7 +155,7 @@ export function histograms(store: MeshStore, epsilon: number): Histogram[] {
   const simplices = new Simplices(store);
   for (let cell = 0; cell < store.simplices; cell++) {
     simplices.measure(cell);
-    size.add(simplices.radius / epsilon);
+    size.add(simplices.radius / most);
     ratio.add(simplices.radius / simplices.shortest);
     fat.add(simplices.volume / simplices.longest ** k / fattest(k));
     if (k === 2) simplices.angles(cell, angle.add);

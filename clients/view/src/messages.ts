@@ -21,6 +21,10 @@ export interface MeshRow {
   queries: number;
   revision: number;
   walls: number;
+  regions: number[]; // their labels, where there are any
+  boundaryOnly: boolean;
+  ofPoints: boolean; // a reconstruction: no oracle, no epsilon, no rules
+  places: number[]; // of a reconstruction that is over: what became of its points, as of kPlaces
   certified: boolean | null; // null: not over
 }
 

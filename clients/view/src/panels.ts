@@ -1,5 +1,5 @@
 // The lists beside the mesh. All text goes in as text: labels and titles are strangers'.
-import { wallColour } from "./look";
+import { kPlaces, regionColour, wallColour, type Look } from "./look";
 import type { Claim, WorkerRow, FaultKind, MeshRow, Verdict } from "./messages";
 
 export function element<T extends keyof HTMLElementTagNameMap>(
@@ -132,12 +132,24 @@ export function drawWorkers(host: HTMLElement, rows: WorkerRow[]) {
   host.replaceChildren(rows.length > 0 ? table : element("p", "empty", "No worker serves it."));
 }
 
-export function drawWalls(host: HTMLElement, walls: number) {
-  host.hidden = walls === 0;
+// What the colours are: of what is told by them, and of walls where there are curves of these.
+export function drawLegend(host: HTMLElement, row: MeshRow, { colour, part }: Look) {
+  const items: [text: string, colour: string][] = [];
+  if (colour === "region") {
+    items.push(...row.regions.map((r): [string, string] => [`region ${r}`, regionColour(r)]));
+  } else if (colour === "place") {
+    items.push(...row.places.map((p): [string, string] => [kPlaces[p].name, kPlaces[p].colour]));
+  }
+  const curves = row.k < 3 ? !row.boundaryOnly : row.k === 3 && part === "slice";
+  for (let wall = 0; (curves || colour === "wall") && wall < row.walls; wall++) {
+    items.push([`wall ${wall}`, wallColour(wall)]);
+  }
+  if (!isNews(host, items)) return;
+  host.hidden = items.length === 0;
   host.replaceChildren(
-    ...Array.from({ length: walls }, (_, wall) => {
-      const item = element("span", "", `wall ${wall}`);
-      item.style.setProperty("--swatch", wallColour(wall));
+    ...items.map(([text, swatch]) => {
+      const item = element("span", "", text);
+      item.style.setProperty("--swatch", swatch);
       return item;
     }),
   );

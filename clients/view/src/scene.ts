@@ -18,7 +18,7 @@ import {
 import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { kSeveral } from "./boundary";
 import { Dots, ThickLines } from "./marks";
-import { wallColour, type Shape } from "./look";
+import { paletteColour, wallColour, type Shape } from "./look";
 import type { Scene } from "./messages";
 import { roughIndex } from "./rough";
 
@@ -209,7 +209,7 @@ export class View {
     const corners = Array.from(rim.pointWalls, (wall) => new Color(colourOf(wall)));
     this.corners.show(rim.points, bytesOf(corners));
     this.bareEdge.show(scene.bare.positions, several);
-    this.bare.show(scene.bare.positions, coloursOf({ ...scene.bare, byWall: false }, kWhite));
+    this.bare.show(scene.bare.positions, coloursOf(scene.bare, kWhite));
     this.chosenEdges.show(scene.chosenEdges);
     this.faultEdges.show(scene.faultEdges);
     this.faults.show(scene.faults);
@@ -368,11 +368,16 @@ function bytesOf(colours: Color[]): Uint8Array {
   return Uint8Array.from(colours.flatMap(({ r, g, b }) => [255 * r, 255 * g, 255 * b]));
 }
 
-function coloursOf({ values, byWall }: Pick<Shape, "values" | "byWall">, plain: Color): Uint8Array {
+function coloursOf(
+  { values, palette }: Pick<Shape, "values" | "palette">,
+  plain: Color,
+): Uint8Array {
   const colours = new Uint8Array(3 * values.length);
   const colour = new Color();
   const of = (value: number) =>
-    byWall ? colour.set(wallColour(value)).lerp(kWhite, 0.12) : colourAt(value, colour);
+    palette === "map"
+      ? colourAt(value, colour)
+      : colour.set(paletteColour(palette, value)).lerp(kWhite, palette === "wall" ? 0.12 : 0);
   values.forEach((value, i) => {
     const { r, g, b } = Number.isNaN(value) ? plain : of(value);
     colours[3 * i] = 255 * r;

@@ -1,6 +1,8 @@
 // A mesh as it grows: vertices that only come, simplices that come and go.
 
-function grown<T extends Float64Array | Uint32Array | Int32Array>(array: T, size: number): T {
+type Growing = Float64Array | Uint32Array | Int32Array | Uint8Array;
+
+function grown<T extends Growing>(array: T, size: number): T {
   if (array.length >= size) return array;
   const Type = array.constructor as new (size: number) => T;
   const larger = new Type(Math.max(size, 2 * array.length, 1024));
@@ -15,6 +17,10 @@ export class MeshStore {
   simplices = 0;
   revision = 0;
   walls = new Map<number, bigint>(); // of vertices at the boundary, those they lie on, as bits
+  // Of each simplex so many: none, the region it is in, or, of a boundary, those at its two sides.
+  labelCount = 0;
+  labels = new Uint8Array();
+  places: Uint8Array | null = null; // of each vertex, of a reconstruction that is over
 
   // Open addressing: which simplex is where in `cells`. -1: free.
   private table = new Int32Array(1024).fill(-1);
@@ -27,6 +33,8 @@ export class MeshStore {
   clear() {
     this.vertices = this.simplices = this.revision = 0;
     this.walls.clear();
+    this.labelCount = 0;
+    this.places = null;
     this.table = new Int32Array(1024).fill(-1);
   }
 
@@ -41,15 +49,31 @@ export class MeshStore {
     vertices.forEach((vertex, i) => this.walls.set(vertex, walls[i]));
   }
 
-  addCells(cells: Uint32Array) {
+  // Of a boundary alone: it has two labels on each simplex, also where there is one region.
+  get isBoundary(): boolean {
+    return this.labelCount === 2;
+  }
+
+  // The region that a simplex is in; of a boundary that with the larger label, which its normal leaves.
+  regionOf(cell: number): number {
+    if (this.labelCount === 0) return 1;
+    const at = cell * this.labelCount;
+    return Math.max(...this.labels.subarray(at, at + this.labelCount));
+  }
+
+  addCells(cells: Uint32Array, labels: Uint8Array = new Uint8Array()) {
     const width = this.k + 1;
     const count = cells.length / width;
+    if (count > 0 && labels.length > 0) this.labelCount = labels.length / count;
+    this.labels = grown(this.labels, (this.simplices + count) * this.labelCount);
     this.cells = grown(this.cells, (this.simplices + count) * width);
     this.reserve(this.simplices + count);
     for (let i = 0; i < count; i++) {
       const slot = this.find(cells, i * width);
       if (this.table[slot] >= 0) continue;
       this.cells.set(cells.subarray(i * width, (i + 1) * width), this.simplices * width);
+      const own = labels.subarray(i * this.labelCount, (i + 1) * this.labelCount);
+      this.labels.set(own, this.simplices * this.labelCount);
       this.table[slot] = this.simplices++;
     }
   }
@@ -65,6 +89,8 @@ export class MeshStore {
       if (hole === last) continue;
       this.table[this.find(this.cells, last * width)] = hole;
       this.cells.copyWithin(hole * width, last * width, (last + 1) * width);
+      const count = this.labelCount;
+      this.labels.copyWithin(hole * count, last * count, (last + 1) * count);
     }
   }
 

@@ -47,6 +47,10 @@ export function rowOf(mesh: Mesh): MeshRow {
     queries: Number(progress?.queries ?? 0),
     revision: Number(mesh.revision),
     walls: mesh.spec?.walls ?? 0,
+    regions: [...new Set(mesh.spec?.labels)].filter((label) => label > 0).sort((a, b) => a - b),
+    boundaryOnly: mesh.spec?.boundaryOnly ?? false,
+    ofPoints: mesh.spec?.reconstruction !== undefined,
+    places: mesh.report?.reconstruction?.places.map(({ place }) => place) ?? [],
     certified: isOver(mesh) ? (mesh.report?.certificate?.certified ?? false) : null,
   };
 }
@@ -148,29 +152,38 @@ function claimsOf(mesh: Mesh, c: Certificate): Claim[] {
     `${grouped(c.unembeddedStars)} stars overlap themselves`,
     "stars",
   );
-  check(
-    "Normal flats",
-    c.fibreFailures === 0n && c.fibreSamples > 0n,
-    `${grouped(c.fibreSamples)} sampled, each meets the mesh once`,
-    c.fibreSamples === 0n
-      ? "not asked"
-      : `${grouped(c.fibreFailures)} of ${grouped(c.fibreSamples)} do not meet the mesh once`,
-    "fibres",
-  );
+  const ofPoints = mesh.spec?.reconstruction !== undefined;
+  if (ofPoints) {
+    number("Normal flats", "none: points have no oracle");
+  } else if (mesh.spec?.boundaryOnly) {
+    number("Normal flats", "not asked of a boundary alone");
+  } else {
+    check(
+      "Normal flats",
+      c.fibreFailures === 0n && c.fibreSamples > 0n,
+      `${grouped(c.fibreSamples)} sampled, each meets the mesh once`,
+      c.fibreSamples === 0n
+        ? "not asked"
+        : `${grouped(c.fibreFailures)} of ${grouped(c.fibreSamples)} do not meet the mesh once`,
+      "fibres",
+    );
+  }
   number("Euler char.", grouped(c.eulerCharacteristic));
   number("Components", grouped(c.components));
   number("Orientable", c.orientable ? "yes" : "no");
   const [radius, epsilon] = [c.maxCircumradius, mesh.spec?.epsilon ?? 0].map(brief);
+  const large = !ofPoints && !c.certified && Number(radius) > Number(epsilon); // as they read
   claims.push({
     title: "Circumradius",
-    text: `at most ${radius}, epsilon is ${epsilon}`,
-    holds: !c.certified && Number(radius) > Number(epsilon) ? false : null, // as they read
+    text: `at most ${radius}${ofPoints ? "" : `, epsilon is ${epsilon}`}`,
+    holds: large ? false : null,
   });
   number("Radius / edge", `at most ${brief(c.maxRadiusEdge)}`);
   number("Fatness", `at least ${brief(c.minFatness)}`);
   if (k === 2) number("Angles", `at least ${brief(c.minAngleDegrees)}°`);
+  const size = ofPoints ? "the largest circumradius" : "epsilon";
   const reach = Number.isFinite(c.estimatedReach)
-    ? `${c.certified ? "about" : "at most"} ${brief(c.estimatedReach)}, epsilon is ${brief(c.epsilonOverReach)} of it`
+    ? `${c.certified ? "about" : "at most"} ${brief(c.estimatedReach)}, ${size} is ${brief(c.epsilonOverReach)} of it`
     : "nothing limits it: all is flat";
   const coarse = c.onlyTooCoarse || (!c.certified && c.epsilonOverReach >= 1);
   if (c.estimatedReach > 0)

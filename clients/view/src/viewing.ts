@@ -65,8 +65,10 @@ export class Viewing {
     clearTimeout(this.timer);
   }
 
-  private get epsilon(): number {
-    return this.mesh?.spec?.epsilon ?? 1;
+  // The largest circumradius, which is epsilon where it is bounded.
+  private get largest(): number {
+    const { spec, report } = this.mesh ?? {};
+    return spec?.epsilon || report?.certificate?.maxCircumradius || 1;
   }
   private get visible(): MeshStore | null {
     return this.shown ?? (this.wanted === null ? this.store : null);
@@ -126,7 +128,7 @@ export class Viewing {
           this.store.removeCells(indices(part.removed));
           this.store.addPoints(Number(part.firstVertex), doubles(part.points));
           this.store.addWalls(part.boundaryVertices, part.boundaryWalls);
-          this.store.addCells(indices(part.added));
+          this.store.addCells(indices(part.added), part.addedLabels);
         }
         parts = [];
         this.store.revision = Number(delta.revision);
@@ -138,6 +140,7 @@ export class Viewing {
         this.over = true;
         this.hear(event.value);
         this.draw();
+        if (event.value.spec?.reconstruction) void this.findPlaces();
       }
     };
     while (!this.stop.signal.aborted) {
@@ -212,12 +215,38 @@ export class Viewing {
         store.revision = Number(part.revision);
         store.addPoints(Number(part.firstVertex), doubles(part.points));
         store.addWalls(part.boundaryVertices, part.boundaryWalls);
-        store.addCells(indices(part.cells));
+        store.addCells(indices(part.cells), part.cellLabels);
       },
       { stop: this.stop.signal, revision },
     );
     if (end.code !== 0) this.send({ type: "loading", text: end.message });
     return end.code === 0 ? store : null;
+  }
+
+  // What became of the points of a reconstruction, which comes with them in a download alone.
+  private async findPlaces() {
+    const store = this.store;
+    if (store === null || store.vertices === 0) return;
+    const places = new Uint8Array(store.vertices);
+    const enough = new AbortController();
+    this.stop.signal.addEventListener("abort", () => enough.abort());
+    const request = create(DownloadMeshRequestSchema, {
+      name: this.name,
+      revision: BigInt(store.revision),
+    });
+    const take = (frame: Uint8Array) => {
+      const part = fromBinary(DownloadMeshResponseSchema, frame);
+      const first = Number(part.firstVertex);
+      const codes = part.places?.codes ?? new Uint8Array();
+      if (first + codes.length <= places.length) places.set(codes, first);
+      if (codes.length > 0) store.places = places;
+      if (part.cells !== undefined && part.cells.data.length > 0) enough.abort();
+    };
+    await this.source.call("DownloadMesh", toBinary(DownloadMeshRequestSchema, request), take, {
+      stop: enough.signal,
+      revision: store.revision,
+    });
+    this.draw();
   }
 
   lookAt(look: Look) {
@@ -268,13 +297,13 @@ export class Viewing {
     this.drawnAt = performance.now();
     if (!this.fetching) this.answered = this.asked();
     const projected = project(store, this.look.frame);
-    const shape = shapeOf(store, this.look, projected, this.epsilon);
+    const shape = shapeOf(store, this.look, projected, this.largest);
     const rim = rimOf(store, this.look, projected);
-    const bare = bareOf(store, projected);
+    const bare = bareOf(store, projected, this.look);
     const corners = shape.index ?? shape.positions;
     const drawn = [corners, rim.segments, rim.points, bare.positions].some((x) => x.length > 0);
     const faults = this.faults(store);
-    const flight = flightTo(store, this.look, projected, this.epsilon, faults);
+    const flight = flightTo(store, this.look, projected, this.largest, faults);
     if (this.flightDue && flight !== null) {
       this.flightDue = false;
       this.send(flight);
@@ -304,7 +333,11 @@ export class Viewing {
     if (store === null || store.simplices === 0) return;
     this.send({
       type: "histograms",
-      histograms: histograms(store, this.epsilon),
+      histograms: histograms(
+        store,
+        this.largest,
+        this.mesh?.spec?.reconstruction ? "the largest" : "epsilon",
+      ),
       revision: store.revision,
     });
   }

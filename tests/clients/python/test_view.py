@@ -56,6 +56,34 @@ def test_the_page_is_given_the_mesh_as_a_server_would_send_it(tmp_path, command)
     assert not status.HasField("report")
 
 
+def test_the_page_is_given_regions_and_what_became_of_points(tmp_path, command):
+    command(f"printf '%s' '{PAGE}'")
+    bare = torus(5, 4)
+    labels = np.array([1, 2] * 20, dtype=np.int8)
+    file = tmp_path / "mesh.html"
+
+    def shown(**more):
+        stellate.Mesh(bare.points, bare.simplices, **more).show(file)
+        replies = recorded(file.read_text())
+        grown = stellate_pb2.WatchMeshResponse.FromString(replies["WatchMesh"][0])
+        return grown.delta.delta, mesh_pb2.Mesh.FromString(replies["GetMesh"][0]), replies
+
+    delta, status, replies = shown(labels=labels)
+    assert delta.added_labels == labels.tobytes() and status.spec.labels == b"\1\2"
+    assert status.spec.dimension == 2 and not status.spec.boundary_only
+    assert "DownloadMesh" not in replies
+
+    delta, status, _ = shown(labels=np.stack([labels, 0 * labels], axis=1))
+    assert delta.added_labels == b"\1\0\2\0" * 20 and status.spec.labels == b"\0\1\2"
+    assert status.spec.dimension == 3 and status.spec.boundary_only
+
+    _, status, replies = shown(places=np.array(["OK"] * 17 + ["EDGE"] * 3))
+    part = stellate_pb2.DownloadMeshResponse.FromString(replies["DownloadMesh"][0])
+    assert part.places.codes == bytes(17) + b"\5\5\5"
+    assert status.spec.HasField("reconstruction")
+    assert [(p.place, p.points) for p in status.report.reconstruction.places] == [(0, 17), (5, 3)]
+
+
 def test_no_command_line_is_an_error_of_its_own(monkeypatch):
     monkeypatch.setenv("STELLATE", "/nowhere/stellate")
     mesh = torus(5, 4)
