@@ -44,6 +44,7 @@ class Mesh:
         order points away from and into, 0 being outside; a solid without labels has the label 1.
       places: of a finished reconstruction, (n,) str: what became of each point, "OK", "MERGED", ... (see
         stellate.reconstruct); else None.
+      region_names: the names of the labels 1, 2, ..., as the oracle gave them; "" where there is none.
       smoothed: of a reconstruction from noisy points, (n, d): the positions that the complex was built on
         and that its certificate is about; None where they are the points.
     """
@@ -58,14 +59,21 @@ class Mesh:
     labels: np.ndarray | None = None
     places: np.ndarray | None = None
     smoothed: np.ndarray | None = None
+    region_names: tuple[str, ...] = ()
 
-    def region(self, label: int) -> Mesh:
-        """The part with one label, of the same points. Its boundary is where it ends or meets others.
+    def region(self, label: int | str) -> Mesh:
+        """The part with one label, or with that name, of the same points. Its boundary is where it ends
+        or meets others.
 
         Of the boundary alone: the closed surface of that region, its normals outwards.
         """
-        if self.labels is None or not (self.labels == label).any():
-            have = () if self.labels is None else np.unique(self.labels).tolist()
+        if isinstance(label, str):
+            if not label or self.region_names.count(label) != 1:
+                known = list(self.region_names)
+                raise ValueError(f"the mesh has no one region named {label!r}; names: {known}")
+            label = self.region_names.index(label) + 1
+        if self.labels is None or label == 0 or not (self.labels == label).any():
+            have = () if self.labels is None else np.unique(self.labels[self.labels > 0]).tolist()
             raise ValueError(f"the mesh has no region {label!r}; it has {list(have)}")
         if self.is_boundary:
             on = (self.labels == label).any(axis=1)

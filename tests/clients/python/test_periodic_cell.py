@@ -163,7 +163,7 @@ def test_a_mesh_on_a_cell_is_unwrapped(copies):
     triangles = plain.points[plain.simplices]
     area = np.abs(np.linalg.det(triangles[:, 1:] - triangles[:, :1])).sum() / 2
     assert area == pytest.approx(count * np.sqrt(0.75)) and len(triangles) == count * 98
-    pairs, periods = period.matching(copies)
+    pairs, periods = period.node_pairs(copies)
     assert (
         np.abs(plain.points[pairs[:, 1]] - plain.points[pairs[:, 0]] - periods @ HEX).max() < 1e-9
     )

@@ -75,7 +75,7 @@ def test_a_gyroid_surface(server, name, epsilon):
     plain = period.plain(2)
     assert len(plain.simplices) == 8 * len(mesh.simplices)
     assert np.abs(g(plain.points)).max() < 1e-9
-    pairs, periods = period.matching(2)
+    pairs, periods = period.node_pairs(2)
     off = plain.points[pairs[:, 1]] - plain.points[pairs[:, 0]] - periods @ lattice
     assert np.abs(off).max() < 1e-9
     closed = glued(plain, pairs)
@@ -101,7 +101,7 @@ def test_a_gyroid_solid(server, name, epsilon):
     assert np.abs(g(plain.points[np.unique(skin.simplices)])).max() < 1e-9
     assert len(skin.simplices) == len(mesh.boundary[0].simplices)
     assert sizes(plain.points[skin.simplices]).sum() == pytest.approx(area(g, lattice), rel=0.03)
-    pairs, _ = period.matching()
+    pairs, _ = period.node_pairs()
     assert euler_characteristic(glued(plain, pairs)) == -4 and len(pairs) > 50
 
 

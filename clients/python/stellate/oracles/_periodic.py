@@ -25,6 +25,7 @@ _NEAR = (
 )
 _PERIODS = 64  # places where a function is tried for its period
 _AGREE = 1e-7  # of what its values are, to which it has one
+_MOST_IN_TABLES = 16  # walls with labels, which servers take
 
 Function = Callable[[Array], Any]
 
@@ -52,6 +53,7 @@ class PeriodicCell:
     Attributes:
       lattice: (d, d), as given.
       radii: (N,), of the circles.
+      dual: (d, d), the gradient of each lattice coordinate in a row.
     """
 
     thread_safe = True
@@ -72,6 +74,7 @@ class PeriodicCell:
         turns = 2 * np.pi * np.linalg.inv(vectors[1:]) @ forms.T
         self._turns = np.ascontiguousarray(turns)  # (d, N): plain coordinates to angles
         self._inverse = np.linalg.inv(self.lattice)
+        self.dual = self._inverse.T  # (d, d): the gradients of the lattice coordinates
         # What takes the angles of some circles that tell where a point is to plain coordinates.
         self._trees = {t: np.linalg.inv(self._turns[:, list(t)]) for t in _trees(pairs, d)}
         self._best = max(self._trees, key=lambda tree: float(self.radii[list(tree)].prod()))
@@ -146,6 +149,40 @@ class PeriodicCell:
         names = [f"wall {i}" for i in range(len(several))]
         lifted = [Lifted(self, *three) for three in zip(several, slopes, names)]
         return Clipped(self, lifted)
+
+    def cut(
+        self,
+        walls: Function | Sequence[Function] = (),
+        gradients: Any = None,
+        *,
+        labels: Any = None,
+        origin: Any = None,
+        names: Sequence[str] = (),
+    ) -> CutCell:
+        """{g >= 0}, or the regions of several periodic walls, cut along the cell's faces: no simplex goes
+        through one, so that mesh.unwrap(cut) is a cell with plane faces, and opposite ones have the same
+        nodes.
+
+            cut = cell.cut(g, gradient, labels=[1, 2])  # a matrix, and what is where g >= 0
+            period = stellate.mesh(cut, epsilon=0.3).unwrap(cut)
+            mesh, (pairs, periods) = period.plain(), period.node_pairs()
+
+        Args:
+          walls, gradients: as of `solid`; none of them: all of the cell.
+          labels: (2^walls,), of the vectors of the walls' signs, as in Oracle.labels; None: 1 where all
+            are positive.
+          origin: (d,), plain coordinates of a corner of the cell, by default 0. Walls have to cross the
+            faces, and those planes halfway between them, at an angle.
+          names: of the labels 1, 2, ...
+
+        Raises: InvalidArgument, also for more than 16 walls with the d that cut.
+        """
+        several = [walls] if callable(walls) else list(walls)
+        slopes = [gradients] if callable(gradients) else gradients
+        slopes = [None] * len(several) if slopes is None else list(slopes)
+        if len(slopes) != len(several):
+            raise InvalidArgument("gradients have to be one for each wall, or None")
+        return CutCell(self, several, slopes, labels, origin, names)
 
     # Pieces.
 
@@ -227,6 +264,78 @@ def _down(bends: Array, slopes: Array) -> Array:
         for j in range(i + 1, d):
             x[:, i] -= bends[:, j, i] * x[:, j]
     return x
+
+
+class CutCell(Clipped):
+    """What PeriodicCell.cut makes: an oracle of walls, of which the last d cut along the faces.
+
+    Each of those is a sine that is zero on two opposite faces, which are one, and on the plane halfway
+    between them. What is on its sides has a label of its own, so that it is kept: the labels that the
+    server sees are those of the parts, `parts` of which says what label of `labels` each belongs to.
+
+    Attributes:
+      cell, origin: as given.
+      parts: (number of the server's labels,), the label of each, 0 of 0.
+    """
+
+    def __init__(
+        self,
+        cell: PeriodicCell,
+        walls: list[Function],
+        gradients: list[Function | None],
+        labels: Any,
+        origin: Any,
+        names: Sequence[str],
+    ) -> None:
+        d, m = cell.dimension, len(walls)
+        self.cell = cell
+        self.origin = np.zeros(d) if origin is None else np.array(origin, dtype=np.float64)
+        if self.origin.shape != (d,) or not np.isfinite(self.origin).all():
+            raise InvalidArgument(f"origin has to be a point of R^{d}, and is {origin!r}")
+        if m + d > _MOST_IN_TABLES:
+            raise InvalidArgument(
+                f"there are {m} walls, and {d} that cut; there may be {_MOST_IN_TABLES} together"
+            )
+        given = np.zeros(1 << m, dtype=np.int8) if labels is None else np.array(labels)
+        if labels is None:
+            given[-1] = 1
+        if given.shape != (1 << m,) or given.dtype.kind not in "iu":
+            raise InvalidArgument(f"labels have to be {1 << m} whole numbers, for {m} walls")
+        inside = np.unique(given[given > 0])
+        if not inside.size or inside.size << d > 127:
+            raise InvalidArgument(
+                f"there are {inside.size} labels above 0, each in {1 << d} parts; there may be 1 to "
+                f"{127 >> d}"
+            )
+        self.parts = np.concatenate([[0], np.repeat(inside, 1 << d)]).astype(np.int8)
+        codes = np.arange(1 << (m + d))
+        own = given[codes % (1 << m)]
+        table = np.searchsorted(inside, np.maximum(own, 0)) * (1 << d) + (codes >> m) + 1
+        table = np.where(own > 0, table, own)
+        lifted = [
+            Lifted(cell, *three) for three in zip(walls, gradients, (f"wall {i}" for i in range(m)))
+        ]
+        seams = [_Seam(cell, axis, self.origin) for axis in range(d)]
+        lifted += [Lifted(cell, seam, seam.gradient, f"face {i}") for i, seam in enumerate(seams)]
+        super().__init__(cell, lifted, labels=table)
+        self.names = tuple(names)
+
+
+class _Seam:
+    """sin(2 pi u) of one of the lattice coordinates, from an origin on."""
+
+    def __init__(self, cell: PeriodicCell, axis: int, origin: Array) -> None:
+        self._cell, self._axis, self._origin = cell, axis, origin
+
+    def __call__(self, points: Array) -> Array:
+        return np.asarray(np.sin(self._angle(points)))
+
+    def gradient(self, points: Array) -> Array:
+        slope = 2 * np.pi * np.cos(self._angle(points))
+        return np.asarray(slope[:, None] * self._cell.dual[self._axis])
+
+    def _angle(self, points: Array) -> Array:
+        return np.asarray(2 * np.pi * self._cell.fractional(points - self._origin)[:, self._axis])
 
 
 class Lifted:

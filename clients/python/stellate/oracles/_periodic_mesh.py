@@ -11,6 +11,7 @@ import numpy as np
 from .._mesh import Mesh
 from .._rows import norms
 from ..errors import InvalidArgument
+from ._periodic import CutCell
 
 _OFF = 1e-6  # of the torus's size: so near to it points of a mesh of it lie
 
@@ -28,6 +29,9 @@ class PeriodicMesh:
       shifts: (m, k+1, d) int64, in vectors of the lattice.
       lattice: (d, d), a vector in each row.
       walls: (n,) uint64, as of a Mesh, or None.
+      labels: (m,) int8, as of a Mesh, or None.
+      region_names: of the labels 1, 2, ...
+      origin: (d,), a corner of the cell that the points are in.
     """
 
     points: np.ndarray
@@ -35,6 +39,9 @@ class PeriodicMesh:
     shifts: np.ndarray
     lattice: np.ndarray
     walls: np.ndarray | None = None
+    labels: np.ndarray | None = None
+    region_names: tuple[str, ...] = ()
+    origin: np.ndarray | None = None
 
     def corners(self) -> np.ndarray:
         """(m, k+1, d): where the corners of the simplices are."""
@@ -43,16 +50,16 @@ class PeriodicMesh:
     def plain(self, copies: int | Sequence[int] = 1) -> Mesh:
         """One period, or several side by side, as a mesh of R^d: whole simplices, none cut.
 
-        Its border is jagged, and goes over into itself by the period: points there are repeated, and
-        `matching` says which belong together. As points it has those of all copies that some simplex
-        needs.
+        Its border is jagged, or, of a PeriodicCell.cut, plane, and goes over into itself by the period:
+        points there are repeated, and `node_pairs` says which belong together. As points it has those of
+        all copies that some simplex needs.
 
         Args:
           copies: along each vector of the lattice, or along all.
         """
         return self._built(copies)[0]
 
-    def matching(self, copies: int | Sequence[int] = 1) -> tuple[np.ndarray, np.ndarray]:
+    def node_pairs(self, copies: int | Sequence[int] = 1) -> tuple[np.ndarray, np.ndarray]:
         """Points of plain(copies) that are the same modulo its period, for periodic conditions.
 
         Returns: pairs (p, 2) int64 of its ids, the first of them one and the same for all that belong
@@ -86,11 +93,14 @@ class PeriodicMesh:
         ids = np.broadcast_to(self.simplices, (len(cells), *self.simplices.shape)).reshape(-1)
         keys, where = np.unique(np.column_stack([ids, shifts]), axis=0, return_inverse=True)
         rows = np.sort(np.ravel(where).reshape(-1, self.simplices.shape[1]), axis=1)
-        rows = rows[np.lexsort(rows.T[::-1])].astype(np.int64)
+        order = np.lexsort(rows.T[::-1])
+        rows = rows[order].astype(np.int64)
         which, at = keys[:, 0], keys[:, 1:]
         points = self.points[which] + at @ self.lattice
         walls = None if self.walls is None else self.walls[which]
-        return Mesh(points, rows, walls=walls), which, at, counts
+        labels = None if self.labels is None else np.tile(self.labels, len(cells))[order]
+        mesh = Mesh(points, rows, walls=walls, labels=labels, region_names=self.region_names)
+        return mesh, which, at, counts
 
     def __repr__(self) -> str:
         return (
@@ -101,6 +111,9 @@ class PeriodicMesh:
 
 def unwrapped(mesh: Mesh, cell: Any) -> PeriodicMesh:
     """A mesh of something on a cell's torus, whose simplices go on by the shortest ways: Mesh.unwrap."""
+    cut = cell if isinstance(cell, CutCell) else None
+    if cut is not None:
+        cell = cut.cell
     if getattr(cell, "ambient_dimension", None) != mesh.ambient_dimension:
         raise InvalidArgument(
             f"unwrap takes the oracles.PeriodicCell that the mesh is on, whose points are in "
@@ -113,6 +126,8 @@ def unwrapped(mesh: Mesh, cell: Any) -> PeriodicMesh:
             f"the mesh is not in this cell: a point of it is {away.max():.3g} away from the torus"
         )
     shares = points @ np.linalg.inv(cell.lattice)
+    if cut is not None:
+        shares, points = _in_cut(mesh, cut, shares)
     corners = shares[mesh.simplices]
     shifts = -np.round(corners - corners[:, :1])
     corners = corners + shifts
@@ -123,9 +138,31 @@ def unwrapped(mesh: Mesh, cell: Any) -> PeriodicMesh:
         )
     back = np.floor(corners.mean(axis=1, keepdims=True))
     whole = (shifts - back).astype(np.int64)
-    if mesh.walls is not None:
+    if mesh.walls is not None and cut is None:
         _join(mesh.simplices, whole, mesh.walls)
-    return PeriodicMesh(points, mesh.simplices, whole, cell.lattice, mesh.walls)
+    labels, names, origin = mesh.labels, mesh.region_names, None
+    if cut is not None:
+        labels, names, origin = cut.parts[mesh.labels], cut.names, cut.origin
+    return PeriodicMesh(
+        points, mesh.simplices, whole, cell.lattice, mesh.walls, labels, names, origin
+    )
+
+
+def _in_cut(mesh: Mesh, cut: CutCell, shares: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lattice coordinates from the cell's own corner on, and plain ones: exactly 0 on its faces, and
+    one half between them, for the points that are on the walls that cut. Raises: InvalidArgument."""
+    d = len(cut.origin)
+    if mesh.walls is None or mesh.labels is None or mesh.labels.ndim != 1:
+        raise InvalidArgument(
+            "the mesh is not of this cell that is cut: it has no walls and labels"
+        )
+    shares = shares - cut.origin @ np.linalg.inv(cut.cell.lattice)
+    shares -= np.floor(shares)
+    on = (mesh.walls[:, None] >> np.arange(cut.walls - d, cut.walls).astype(np.uint64)) & np.uint64(
+        1
+    )
+    shares = np.where(on == 1, np.round(2 * shares) / 2 % 1, shares)
+    return shares, cut.origin + shares @ cut.cell.lattice
 
 
 def _join(simplices: np.ndarray, shifts: np.ndarray, walls: np.ndarray) -> None:
