@@ -47,7 +47,9 @@ const char* PlaceAdvice(Place place) {
     case Place::kSheets:
       return "another part of the manifold is as near as the neighbours are: add points there";
     case Place::kNoise:
-      return "the noise is more than half of the spacing: average the points, or thin them";
+      return "points are off a smooth manifold by half of the spacing or more: if by noise, "
+             "average "
+             "or thin them; a crease or a corner stays in doubt, however many points there are";
     case Place::kSparse:
       return "tangent spaces turn too far from point to point: about 2.3 times as many points are "
              "needed here";

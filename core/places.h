@@ -14,7 +14,7 @@ enum class Place : std::uint8_t {
   // What is not resolved has one of these, the first that applies.
   kEdge = 5,      // its star is open: M ends here, or has a hole in the sample
   kSheets = 6,    // another part of M is as near as its neighbours
-  kNoise = 7,     // the noise is more than half of the spacing
+  kNoise = 7,     // the noise is more than half of the spacing; or M has a crease or a corner there
   kSparse = 8,    // tangent spaces turn too much from neighbour to neighbour: too few points
   kClose = 9,     // another point is much nearer than the spacing
   kDisagree = 10  // stars disagree for no such reason

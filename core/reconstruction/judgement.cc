@@ -33,9 +33,11 @@ Specification SpecificationOf(const ReconstructionSpecification& spec, bool has_
   return result;
 }
 
-// "point 17, (0.5, 1, 0)"
-std::string NamePlace(const MeshView& mesh, std::uint32_t p) {
-  return Message("point ", p, ", ", NamePoint(PointOf(mesh, p)));
+// "point 17, (0.5, 1, 0)", as it was given.
+std::string NamePlace(const MeshView& mesh, const KnownOfPoints& known, std::uint32_t p) {
+  const auto d = static_cast<Eigen::Index>(mesh.d);
+  return Message("point ", p, ", ",
+                 NamePoint(Eigen::Map<const Eigen::VectorXd>(known.given + p * mesh.d, d)));
 }
 
 // "at 12 of 1000 points (EDGE 10, NOISE 2), the first is point 17, (0.5, 1, 0): ..."
@@ -54,7 +56,7 @@ std::string DescribeCauses(const MeshView& mesh, const KnownOfPoints& known) {
                       counts[place]);
   const Place cause = known.causes[*first];
   return Message("at ", known.against, " of ", mesh.vertices, " points (", list, "); the first is ",
-                 NamePlace(mesh, *first), ": ", PlaceName(cause), ", ", PlaceAdvice(cause));
+                 NamePlace(mesh, known, *first), ": ", PlaceName(cause), ", ", PlaceAdvice(cause));
 }
 
 class Judge {
@@ -127,6 +129,19 @@ class Judge {
     return known_.tangents_given || counts_.looks[spec_.dimension] >= kMostlyRight;
   }
 
+  // If most places look of one other dimension, that is the cause of all else.
+  std::string OtherDimension() const {
+    if (LooksRight()) return "";
+    for (int other = 0; other <= 4; ++other) {
+      if (other == spec_.dimension || counts_.looks[other] < kMostlyRight) continue;
+      return Message("they look ", other == 0 ? "more than 4" : Message(other), "-dimensional at ",
+                     Brief(100 * counts_.looks[other]),
+                     " % of the places. Give the dimension that they have; or, if coordinates are "
+                     "in units of their own, scale them, so that a step counts alike in each");
+    }
+    return "";
+  }
+
   void Conclude() {
     Certificate& c = x_.certificate;
     c.warnings = x_.findings.warnings();
@@ -144,6 +159,7 @@ class Judge {
 
   // Why a manifold is not certified.
   std::string WhatIsMissing() const {
+    if (const std::string other = OtherDimension(); !other.empty()) return other;
     if (known_.against > 0) return DescribeCauses(mesh_, known_);
     if (!LooksRight())
       return Message("most places do not look ", spec_.dimension, "-dimensional, see the warnings");
@@ -176,11 +192,14 @@ class Judge {
       case CertificateLevel::kRefused:
         break;
     }
+    const std::string other = OtherDimension();
+    std::string causes;
+    if (known_.against > 0) causes = Message("something is wrong ", DescribeCauses(mesh_, known_));
+    if (!other.empty()) causes = other + (causes.empty() ? "" : ". As it is, ") + causes;
     return Message("Not certified: ",
-                   known_.against > 0 ? Message("the points do not make a manifold of dimension ",
-                                                spec_.dimension, ": something is wrong ",
-                                                DescribeCauses(mesh_, known_), ". On the mesh: ")
-                                      : std::string(),
+                   causes.empty() ? std::string()
+                                  : Message("the points do not make a manifold of dimension ",
+                                            spec_.dimension, ": ", causes, ". On the mesh: "),
                    x_.findings.Problems());
   }
 

@@ -192,7 +192,8 @@ class Reconstructor {
     for (const Place place : assembly_.places)
       counts.unfilled_vertices += place == Place::kDisagree;
     for (const std::uint8_t extent : cloud_.extents)
-      if (extent > 0) counts.looks[extent <= 4 ? extent : 0] += 1.0 / cloud_.size;
+      if (extent > 0) ++counts.looks[extent <= 4 ? extent : 0];
+    for (double& share : counts.looks) share /= cloud_.size;
     result_.report.reconstruction = counts;
     result_.report.termination = Termination::kConverged;
     result_.report.counts.vertices = n_;
@@ -204,6 +205,7 @@ class Reconstructor {
     unused_.resize(n_);
     for (std::size_t p = 0; p < n_; ++p)
       unused_[p] = result_.places[p] == Place::kMerged || result_.places[p] == Place::kDropped;
+    known_.given = given_.points.data();
     known_.tangents_given = given_.tangents.size() > 0 && !cloud_.any_smoothed;
     const bool by_differences = spec_.reach && spec_.noise == 0.0 && !known_.tangents_given;
     ReconstructionSpecification spec = spec_;

@@ -12,6 +12,7 @@
 #include <utility>
 #include <vector>
 
+#include "core/base/name_point.h"
 #include "tests/reconstruction/judge.h"
 #include "tests/reconstruction/samples.h"
 
@@ -193,6 +194,27 @@ TEST(Degenerate, PointsOfALineAreNoSurface) {
   ASSERT_TRUE(result) << result.error().message;
   EXPECT_FALSE(result->report.certificate.certified);
   EXPECT_GT(result->report.reconstruction->looks[1], .9);
+  EXPECT_LE(result->report.reconstruction->looks[1], 1);
+  // The dimension is the cause, whatever else it brings about.
+  const std::string& verdict = result->report.certificate.verdict;
+  EXPECT_NE(verdict.find("dimension 2: they look 1-dimensional"), std::string::npos) << verdict;
+  EXPECT_LT(verdict.find("1-dimensional"), verdict.find("something is wrong")) << verdict;
+}
+
+TEST(Degenerate, PlacesAreNamedByThePointsAsTheyCame) {
+  // A surface taken for a curve looks noisy, and is smoothed to the curve that it is not.
+  MatrixXd points(3, 400);
+  for (Eigen::Index i = 0; i < 400; ++i) {
+    const double z = 1 - 2 * (static_cast<double>(i) + .5) / 400;
+    const double turn = 2.399963 * static_cast<double>(i), around = std::sqrt(1 - z * z);
+    points.col(i) << around * std::cos(turn), around * std::sin(turn), z;
+  }
+  const auto result = Reconstruct(SpecOf(1, 3), {points, {}});
+  ASSERT_TRUE(result) << result.error().message;
+  const std::string& verdict = result->report.certificate.verdict;
+  EXPECT_NE(verdict.find("they look 2-dimensional"), std::string::npos) << verdict;
+  EXPECT_NE(verdict.find("the first is point 0, " + NamePoint(points.col(0))), std::string::npos)
+      << verdict;
 }
 
 // A torus as a square grid: each four neighbours are on a circle.
