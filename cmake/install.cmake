@@ -39,7 +39,7 @@ install(DIRECTORY ${PROJECT_BINARY_DIR}/include/stellate DESTINATION ${CMAKE_INS
 if(NOT STELLATE_CORE_ONLY)
   stellate_export(client
     stellate_client=client stellate_mesh=mesh stellate_catalogue=catalogue
-    stellate_doctor=doctor stellate_pipe=pipe stellate_proto=proto)
+    stellate_pipe=pipe stellate_proto=proto)
   set(without)
   if(STELLATE_ORACLES)
     stellate_export(oracles stellate_oracles=oracles)

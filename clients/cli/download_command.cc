@@ -61,7 +61,7 @@ int DownloadCommand::Deliver(const Mesh& mesh) const {
   if (json_) {
     std::cout << ToJson(mesh.report) << "\n";
   } else if (!quiet_ && has_report) {
-    PrintReport(mesh.report);
+    PrintText(mesh.report.text);
   } else if (!quiet_) {
     std::printf("%lld vertices, %lld simplices, not the end of the mesh\n",
                 static_cast<long long>(mesh.points.cols()),

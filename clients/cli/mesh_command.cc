@@ -98,7 +98,7 @@ int MeshCommand::Deliver(const Mesh& mesh) const {
   if (json_) {
     std::cout << ToJson(mesh.report) << "\n";
   } else if (!quiet_) {
-    PrintReport(mesh.report);
+    PrintText(mesh.report.text);
   }
   return status;
 }

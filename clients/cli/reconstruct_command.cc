@@ -73,7 +73,7 @@ int ReconstructCommand::Deliver(const Mesh& mesh) const {
   if (json_) {
     std::cout << ToJson(mesh.report) << "\n";
   } else if (!quiet_) {
-    PrintReport(mesh.report);
+    PrintText(mesh.report.text);
   }
   return status;
 }

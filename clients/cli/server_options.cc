@@ -69,8 +69,8 @@ int PrintError(const Error& error) {
   return ExitStatusOf(error);
 }
 
-void PrintReport(const Report& report) {
-  std::istringstream lines(report.text);
+void PrintText(const std::string& text) {
+  std::istringstream lines(text);
   for (std::string line; std::getline(lines, line);)
     std::cout << text::Printable(line, '?') << "\n";
 }

@@ -5,7 +5,7 @@
 
 #include "exit_status.h"
 #include "stellate/connection.h"
-#include "stellate/report.h"
+#include "stellate/error.h"
 
 namespace stellate::cli {
 
@@ -36,7 +36,7 @@ void PrintOutage(const Outage& outage, Seconds patience);
 
 // Prints the error on standard error and gives the exit status that stands for it.
 int PrintError(const Error& error);
-// On standard output.
-void PrintReport(const Report& report);
+// Prints several lines on standard output.
+void PrintText(const std::string& text);
 
 }  // namespace stellate::cli

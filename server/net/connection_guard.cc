@@ -19,7 +19,6 @@
 #include "core/base/message.h"
 #include "server/base/log.h"
 #include "server/net/socket_number.h"
-#include "server/net/who_allows.h"
 
 namespace stellate::server {
 namespace {
@@ -324,8 +323,8 @@ void ConnectionGuard::Close(Connection* connection, const char* setting, const s
   memory_.untidy = true;
   memory_.quiet_at = now + kQuiet;
   ++said_.count;
-  said_.last = Message("the last, of ", connection->peer, ", ", what, "; ",
-                       WhoAllows(setting, limits_.have_flags), " allows ", allowed);
+  said_.last =
+      Message("the last, of ", connection->peer, ", ", what, "; --", setting, " allows ", allowed);
   if (now - said_.time >= kLogPause) SayWhatWasClosed();
 }
 

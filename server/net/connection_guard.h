@@ -36,7 +36,6 @@ class ConnectionGuard {
     // Connections at a time that have not said hello: the handshake of TLS is not over, or HTTP/2
     // has not begun. Half a handshake takes 100 kB. gRPC itself ends them after --hello-seconds.
     std::size_t hellos = 0;
-    bool have_flags = true;  // who_allows.h
   };
 
   // `port`: where the server listens. `judge`: unread.h. `closed` is called, on another thread,

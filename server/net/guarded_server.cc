@@ -13,7 +13,6 @@
 #include "server/grpc_parts/header_bound.h"
 #include "server/net/channel_arguments.h"
 #include "server/net/unix_socket.h"
-#include "server/net/who_allows.h"
 
 namespace stellate::server {
 namespace {
@@ -72,8 +71,7 @@ Status GuardedServer::Listen(const Config& config, ListenAddress* address,
   if (address->IsUnix()) {
     builder->AddListeningPort(address->Target(), tls_->Credentials(), &unix_port);
   } else {
-    auto opened = Listener::Open(*address, config.max_connections,
-                                 WhoAllows("max-connections", hooks_.has_flags));
+    auto opened = Listener::Open(*address, config.max_connections);
     if (!opened) return std::move(opened.error());
     listener_ = std::move(*opened);
     address->port = listener_->port();
@@ -102,8 +100,7 @@ void GuardedServer::Guard(
           static_cast<std::int64_t>(config.max_unread_bytes),
           static_cast<std::int64_t>(config.max_message_bytes),
           std::chrono::duration<double>(config.request_seconds),
-          std::max(kFewestHellos, static_cast<std::size_t>(config.max_connections) / 8),
-          hooks_.has_flags},
+          std::max(kFewestHellos, static_cast<std::size_t>(config.max_connections) / 8)},
       hooks_.judge, hooks_.limit_reached);
   listener_->Start(
       [this, acceptor = std::move(acceptor)](int listener_fd, int fd) {

@@ -25,8 +25,6 @@ class GuardedServer {
     CallJudge judge;  // unread.h
     // A connection was refused or closed by a setting. From any thread.
     std::function<void(const char* setting)> limit_reached;
-    // Whether the program has flags for the limits, which messages then name.
-    bool has_flags = true;
   };
 
   // Starts to listen. `builder` has the services. Uses the address, the files of TLS, and the

@@ -27,7 +27,7 @@ constexpr int kPauseMilliseconds = 100;   // while there is no file left to acce
 constexpr int kLaterMilliseconds = 20;    // while connections are to wait
 
 // How many connections there can be, when `wanted` are asked for.
-std::size_t ConnectionsAllowed(std::size_t wanted, const std::string& who_allows) {
+std::size_t ConnectionsAllowed(std::size_t wanted) {
   rlimit limit{};
   if (getrlimit(RLIMIT_NOFILE, &limit) != 0) return wanted;
   const rlim_t needed = wanted + kOtherFiles;
@@ -40,8 +40,8 @@ std::size_t ConnectionsAllowed(std::size_t wanted, const std::string& who_allows
   const std::size_t allowed = std::min(wanted, files - std::min(kOtherFiles, files / 2));
   if (allowed == wanted) return wanted;
   Log(LogLevel::kWarning, {},
-      Message(who_allows, " allows ", wanted, " connections, but this process may open ", files,
-              " files: it serves ", allowed, " connections; raise `ulimit -n`"));
+      Message("--max-connections allows ", wanted, " connections, but this process may open ",
+              files, " files: it serves ", allowed, " connections; raise `ulimit -n`"));
   return allowed;
 }
 
@@ -74,8 +74,7 @@ bool HungUp(int fd) {
 }  // namespace
 
 core::Expected<std::unique_ptr<Listener>> Listener::Open(ListenAddress address,
-                                                         std::size_t max_connections,
-                                                         std::string who_allows) {
+                                                         std::size_t max_connections) {
   addrinfo hints{};
   hints.ai_flags = AI_PASSIVE;
   hints.ai_socktype = SOCK_STREAM;
@@ -103,17 +102,12 @@ core::Expected<std::unique_ptr<Listener>> Listener::Open(ListenAddress address,
                                 ": another program has it, or this machine does not; choose "
                                 "another --listen"));
   }
-  const std::size_t allowed = ConnectionsAllowed(max_connections, who_allows);
   return std::unique_ptr<Listener>(
-      new Listener(std::move(sockets), address.port, allowed, std::move(who_allows)));
+      new Listener(std::move(sockets), address.port, ConnectionsAllowed(max_connections)));
 }
 
-Listener::Listener(std::vector<int> sockets, int port, std::size_t max_connections,
-                   std::string who_allows)
-    : sockets_(std::move(sockets)),
-      port_(port),
-      max_connections_(max_connections),
-      who_allows_(std::move(who_allows)) {}
+Listener::Listener(std::vector<int> sockets, int port, std::size_t max_connections)
+    : sockets_(std::move(sockets)), port_(port), max_connections_(max_connections) {}
 
 Listener::~Listener() {
   Stop();
@@ -178,8 +172,9 @@ bool Listener::IsFull() {
   const bool full = open_.size() >= max_connections_;
   if (full && !was_full_) {
     Log(LogLevel::kWarning, {},
-        Message("there are ", max_connections_, " connections, the most that ", who_allows_,
-                " allows: further ones are closed"));
+        Message("there are ", max_connections_,
+                " connections, the most that "
+                "--max-connections allows: further ones are closed"));
   }
   was_full_ = full;
   return full;

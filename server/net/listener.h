@@ -25,10 +25,9 @@ class Listener {
 
   // Binds every address of the host; port 0 takes a free one. Raises the process's soft limit of
   // open files if that many connections need it; a lower hard limit lowers the number of
-  // connections. `who_allows`: who_allows.h.
-  static core::Expected<std::unique_ptr<Listener>> Open(
-      ListenAddress address, std::size_t max_connections,
-      std::string who_allows = "--max-connections");
+  // connections.
+  static core::Expected<std::unique_ptr<Listener>> Open(ListenAddress address,
+                                                        std::size_t max_connections);
   ~Listener();
 
   int port() const { return port_; }
@@ -43,7 +42,7 @@ class Listener {
   void Stop();
 
  private:
-  Listener(std::vector<int> sockets, int port, std::size_t max_connections, std::string who_allows);
+  Listener(std::vector<int> sockets, int port, std::size_t max_connections);
   void Run(const std::stop_token& stop);
   void Accept(int socket, const std::stop_token& stop);
   bool IsFull();
@@ -52,7 +51,6 @@ class Listener {
   const std::vector<int> sockets_;
   const int port_;
   const std::size_t max_connections_;
-  const std::string who_allows_;
   int wake_ = -1;  // readable when the thread must stop
   Taker take_;
   std::function<void()> refused_;

@@ -16,6 +16,7 @@
 
 #include "exit_status.h"
 #include "files.h"
+#include "net/embedded_server.h"
 #include "replay.h"
 #include "run/epsilon.h"
 #include "silent_oracle.h"
@@ -261,7 +262,14 @@ TEST(AutoEpsilon, GoesOnAsItSays) {
   }
 }
 
-class Doctor : public ::testing::TestWithParam<Case> {};
+class Doctor : public ::testing::TestWithParam<Case> {
+ protected:
+  // One for all cases.
+  static std::string Server() {
+    static const auto server = client::EmbeddedServer::Start().value();
+    return server->address();
+  }
+};
 
 TEST_P(Doctor, FindsThis) {
   const std::string defect = TextAt(GetParam().entry, "defect");
@@ -290,7 +298,8 @@ TEST_P(Doctor, FindsThis) {
   if (At(GetParam().entry, "epsilon").has_number_value()) {
     options.epsilon = At(GetParam().entry, "epsilon").number_value();
   }
-  const CheckReport report = Check(oracle, options);
+  options.connection.server = Server();
+  const CheckReport report = Check(oracle, options).value();
   std::set<std::string> found, expected;
   for (const Finding& finding : report.findings) found.insert(finding.code);
   for (const char* const code : {"PIECES", "SPEED", "SLOW"}) found.erase(code);

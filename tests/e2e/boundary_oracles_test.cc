@@ -82,7 +82,7 @@ TEST_P(BothNearest, TwoOraclesOfNearestPointsWillDo) {
     EXPECT_LT((rim->ClosestPoint(on).points - on).norm(), 1e-9);
   }
   EXPECT_LT((inner->ClosestPoint(mesh->points).points - mesh->points).norm(), 1e-7);
-  const CheckReport report = Check(oracle);
+  const CheckReport report = Examined(oracle);
   EXPECT_TRUE(report.ok()) << ToText(report);
 }
 
@@ -108,13 +108,13 @@ TEST_F(BoundedFromCpp, AClearanceSaysWhereALargerManifoldEnds) {
   ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
   EXPECT_TRUE(mesh->report.certified()) << mesh->report.text;
   EXPECT_EQ(Euler(mesh->simplices), 1);
-  EXPECT_TRUE(Check(oracle).ok()) << ToText(Check(oracle));
+  EXPECT_TRUE(Examined(oracle).ok()) << ToText(Examined(oracle));
 }
 
 TEST_F(BoundedFromCpp, OraclesThatDoNotBelongTogetherAreRefused) {
   const auto refusal = [](std::shared_ptr<Oracle> inner) -> std::string {
     ManifoldWithBoundary oracle(std::move(inner), RimOfCap());
-    EXPECT_FALSE(Check(oracle).ok());
+    EXPECT_FALSE(Examined(oracle).ok());
     try {
       const Expected<Mesh> mesh = MeshManifold(oracle, At(0.25));
       return mesh ? "none" : mesh.error().message;

@@ -149,6 +149,13 @@ TEST_F(CommandLine, DoctorFindsTheCatalogueInGoodHealth) {
   EXPECT_NE(good.output.find("keeps its contract"), std::string::npos) << good.output;
   EXPECT_NE(good.output.find("COARSE_EPSILON"), std::string::npos) << good.output;
   EXPECT_EQ(Run("doctor klein").status, 2);
+  const Result asJson = OnServer("doctor torus:1:0.4 --json");
+  EXPECT_EQ(asJson.status, 0) << asJson.output;
+  for (const char* const words :
+       {"\"ok\": true", "\"code\": \"REACH\"", "\"epsilon\": 0.1", "\"advised\": 0."})
+    EXPECT_NE(asJson.output.find(words), std::string::npos) << asJson.output;
+  EXPECT_EQ(OnServer("doctor torus --epsilon -1").status, 2);
+  EXPECT_EQ(Run("doctor torus --server unix:/nowhere/at/all").status, 3);
 }
 
 TEST_F(CommandLine, TopShowsTheMeshesOnce) {

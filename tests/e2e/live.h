@@ -3,10 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "net/embedded_server.h"
 #include "stellate/client.h"
+#include "stellate/doctor.h"
 #include "support/make_manifold.h"
 
 namespace stellate::testing {
@@ -29,6 +31,15 @@ class Live : public ::testing::Test {
     options.epsilon = epsilon;
     options.connection.server = Server();
     return options;
+  }
+
+  static CheckReport Examined(Oracle& oracle, std::optional<double> epsilon = {}) {
+    CheckOptions options;
+    options.epsilon = epsilon;
+    options.connection.server = Server();
+    const Expected<CheckReport> report = Check(oracle, options);
+    if (!report) ADD_FAILURE() << report.error().message;
+    return report.value_or(CheckReport());
   }
 };
 

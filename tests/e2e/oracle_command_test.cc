@@ -143,9 +143,14 @@ TEST_F(OracleCommand, ProcessesShareAMeshAndChangeNothing) {
 }
 
 TEST_F(OracleCommand, DoctorExaminesCommands) {
-  const Result sound = Run("doctor --oracle-command 'perl " + Shipped("torus.pl") + "'");
-  EXPECT_EQ(sound.status, 0) << sound.output;
-  EXPECT_THAT(sound.output, HasSubstr("The oracle keeps its contract"));
+  for (const std::string& command :
+       {"perl " + Shipped("torus.pl"), "perl " + Shipped("clifford.pl"),
+        "mawk -W interactive -f " + Shipped("clifford.awk")}) {
+    const Result sound = Run("doctor --oracle-processes 2 --oracle-command '" + command + "'");
+    EXPECT_EQ(sound.status, 0) << sound.output;
+    EXPECT_THAT(sound.output, HasSubstr("The oracle keeps its contract"));
+    EXPECT_THAT(sound.output, HasSubstr("points of M lie on 1 of its components"));
+  }
   // Where it is asked for the closest point, it says the point itself.
   const std::string echo = Script("echo", R"(BEGIN { print "stellate-oracle 1 text"; fflush() }
 /^closest/ { left = $2; next }
@@ -156,6 +161,43 @@ TEST_F(OracleCommand, DoctorExaminesCommands) {
   EXPECT_EQ(lying.status, 1);
   EXPECT_THAT(lying.output, HasSubstr("WRONG_DIMENSION"));
   EXPECT_EQ(Run("doctor --oracle-command no-such-program").status, 3);
+}
+
+// A sphere whose program ends as `when` says, with words.
+std::string Dying(const std::string& when) {
+  return R"(BEGIN { print "stellate-oracle 1 text k=2 d=3 seeds=1,0,0"; fflush() }
+/^closest/ {
+  ++batch
+  if ()" +
+         when + R"() { print "the solver diverged" > "/dev/stderr"; exit 5 }
+  left = $2
+  next
+}
+{
+  r = sqrt($1 ^ 2 + $2 ^ 2 + $3 ^ 2)
+  printf "%.17g %.17g %.17g\n", $1 / r, $2 / r, $3 / r
+  if (--left == 0) fflush()
+})";
+}
+
+TEST_F(OracleCommand, DoctorFindsThatItDiesIsSilentOrTalksNonsense) {
+  const std::string greeting =
+      R"(BEGIN { print "stellate-oracle 1 text k=2 d=3 seeds=1,0,0"; fflush() }
+)";
+  const std::pair<std::string, std::string> sick[] = {
+      {Dying("1"), "the solver diverged"},
+      {greeting + R"(/^closest/ { system("exec sleep 60") })", "written for 0.5 seconds"},
+      {greeting + R"(!/^closest/ { print "a b c"; fflush() })", "has 'a'"}};
+  for (const auto& [program, words] : sick) {
+    const Result result =
+        Run("doctor --oracle-silence 0.5 --oracle-command 'mawk -W interactive -f " +
+            Script("sick", program) + "'");
+    EXPECT_EQ(result.status, 1) << result.output;
+    EXPECT_THAT(result.output, HasSubstr("error RAISED: closest_point failed on a batch"));
+    EXPECT_THAT(result.output, HasSubstr(words));
+    EXPECT_THAT(result.output, HasSubstr("Answer every query."));
+    EXPECT_THAT(result.output, HasSubstr("The oracle breaks its contract: 1 error"));
+  }
 }
 
 TEST_F(OracleCommand, UsageIsChecked) {
@@ -179,23 +221,6 @@ TEST_F(OracleCommand, UsageIsChecked) {
     EXPECT_EQ(result.status, 2) << arguments << ": " << result.output;
     EXPECT_THAT(result.output, HasSubstr(words));
   }
-}
-
-// A sphere whose program ends as `when` says, with words.
-std::string Dying(const std::string& when) {
-  return R"(BEGIN { print "stellate-oracle 1 text k=2 d=3 seeds=1,0,0"; fflush() }
-/^closest/ {
-  ++batch
-  if ()" +
-         when + R"() { print "the solver diverged" > "/dev/stderr"; exit 5 }
-  left = $2
-  next
-}
-{
-  r = sqrt($1 ^ 2 + $2 ^ 2 + $3 ^ 2)
-  printf "%.17g %.17g %.17g\n", $1 / r, $2 / r, $3 / r
-  if (--left == 0) fflush()
-})";
 }
 
 TEST_F(OracleCommand, DeathNowAndThenIsSurvived) {

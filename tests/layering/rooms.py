@@ -198,7 +198,6 @@ def in_package(name: str) -> str:
 CLIENTS = {
     "clients/cpp/include": (),
     "clients/cpp/oracles": ("clients/cpp/include", "clients/cpp/pipe"),
-    "clients/cpp/doctor": ("clients/cpp/include",),
     "clients/cpp/pipe": ("clients/cpp/include",),
     "clients/cpp/mesh": ("clients/cpp/include",),
     "clients/cpp/wire": ("clients/cpp/include", "proto"),
@@ -211,18 +210,7 @@ CLIENTS = {
         "clients/cpp/wire",
         "proto",
     ),
-    # The one place where a client listens, and does so as the server does.
-    "clients/listening": (
-        *FACE,
-        "clients/cpp/include",
-        "clients/cpp/net",
-        "clients/cpp/run",
-        "clients/cpp/wire",
-        "proto",
-        "server/config",
-        "server/net",
-    ),
-    "clients/cli": ("clients/cpp/include", "clients/listening", "clients/view/gateway", "text"),
+    "clients/cli": ("clients/cpp/include", "clients/view/gateway", "text"),
     **{
         in_package(room): tuple(in_package(taken) for taken in takes)
         for room, takes in PYTHON.items()
@@ -272,7 +260,6 @@ TABLE = Table(
             "server/net",
             "server/base",
             "clients/cpp/run",
-            "clients/listening",
             "clients/conform",
             "clients/python/stellate",
             "clients/view/gateway",

@@ -1,14 +1,11 @@
 #include "stellate/client.h"
 
-#include <memory>
 #include <optional>
-#include <string>
 #include <utility>
 
-#include "net/channel.h"
-#include "net/embedded_server.h"
 #include "run/declare.h"
 #include "run/epsilon.h"
+#include "run/host.h"
 #include "run/run.h"
 #include "shared/doctor.h"
 #include "stellate/monitor.h"
@@ -16,24 +13,12 @@
 namespace stellate {
 
 Expected<Mesh> MeshManifold(Oracle& oracle, const MeshOptions& options) {
-  Expected<client::Request> request = client::Settle(oracle, options);
+  const Expected<client::Host> host = client::Host::Find(options.connection);
+  if (!host) return tl::unexpected(host.error());
+  Expected<client::Request> request = client::Settle(*host, oracle, options);
   if (!request) return tl::unexpected(request.error());
-  std::unique_ptr<client::EmbeddedServer> embedded;
-  Connection connection = options.connection;
-  if (connection.server.empty()) {
-    auto started = client::EmbeddedServer::Start();
-    if (!started) return tl::unexpected(started.error());
-    embedded = std::move(*started);
-    connection.server = embedded->address();
-    connection.credentials = {};
-    // Pings would show nothing: the end of one's own server shows immediately.
-    connection.keepalive = client::kNoPings;
-  }
-  const auto channel = client::Connect(connection);
-  if (!channel) return tl::unexpected(channel.error());
   for (int retries = options.epsilon == kAuto ? doctor::kAutoRetries : 0;; --retries) {
-    client::Run run(*channel, oracle, request->options,
-                    [&embedded] { return embedded && !embedded->alive(); });
+    client::Run run(host->channel, oracle, request->options, host->IsHopeless());
     Expected<Mesh> mesh = run.Go();
     if (!mesh) return mesh;
     client::Tell(request->epsilon_reason, &mesh->report);

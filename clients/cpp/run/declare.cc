@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "net/channel.h"
+#include "run/check.h"
 #include "stellate/serve.h"
 #include "wire/convert.h"
 #include "wire/status.h"
@@ -11,10 +12,12 @@
 namespace stellate {
 namespace client {
 
-Expected<Request> Settle(Oracle& oracle, const MeshOptions& options) {
+Expected<Request> Settle(const Host& host, Oracle& oracle, const MeshOptions& options) {
   Request request{options, ""};
   if (options.epsilon == kAuto) {
-    Expected<ChosenEpsilon> chosen = ChooseEpsilon(oracle);
+    CheckOptions check;
+    check.stop = options.stop;
+    Expected<ChosenEpsilon> chosen = ChooseEpsilonOn(host, oracle, check);
     if (!chosen) return tl::unexpected(chosen.error());
     Take(*chosen, &request);
   }
@@ -51,11 +54,11 @@ Expected<std::string> DeclareMesh(Oracle& oracle, const MeshOptions& options) {
   if (options.connection.server.empty()) {
     return Fail(ErrorCode::kRefused, "no server is given: say where the mesh is to be");
   }
-  const auto channel = client::Connect(options.connection);
-  if (!channel) return tl::unexpected(channel.error());
-  const Expected<client::Request> request = client::Settle(oracle, options);
+  const Expected<client::Host> host = client::Host::Find(options.connection);
+  if (!host) return tl::unexpected(host.error());
+  const Expected<client::Request> request = client::Settle(*host, oracle, options);
   if (!request) return tl::unexpected(request.error());
-  return client::CreateMesh(*v1::Stellate::NewStub(*channel), oracle, request->options);
+  return client::CreateMesh(*v1::Stellate::NewStub(host->channel), oracle, request->options);
 }
 
 }  // namespace stellate

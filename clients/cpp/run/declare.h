@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "run/host.h"
 #include "stellate/client.h"
 #include "stellate/error.h"
 #include "stellate/v1/stellate.grpc.pb.h"
@@ -14,9 +15,9 @@ struct Request {
   std::string epsilon_reason;  // empty where epsilon was given
 };
 
-// Chooses epsilon where it is automatic, and what suits where the server is: on this machine, if
-// none is named.
-Expected<Request> Settle(Oracle& oracle, const MeshOptions& options);
+// Has the host choose epsilon where it is automatic, and chooses what suits where the server is: on
+// this machine, if none is named.
+Expected<Request> Settle(const Host& host, Oracle& oracle, const MeshOptions& options);
 
 // Sets the epsilon that was chosen, and reports it.
 void Take(const ChosenEpsilon& chosen, Request* request);

@@ -1,6 +1,5 @@
 #include "run/epsilon.h"
 
-#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <string>
@@ -19,29 +18,6 @@ std::string Show(const char* format, double value) {
 double Rounded(double length) { return std::strtod(Show("%.2g", length).c_str(), nullptr); }
 
 }  // namespace
-
-Expected<ChosenEpsilon> ChooseEpsilon(Oracle& oracle) {
-  return client::ChooseEpsilon(Check(oracle));
-}
-
-Expected<ChosenEpsilon> client::ChooseEpsilon(CheckReport report) {
-  if (!report.ok()) {
-    std::erase_if(report.findings, [](const Finding& f) { return f.severity != Severity::kError; });
-    return Fail(ErrorCode::kOracleFailed,
-                "the reach is taken from the oracle's answers, and they cannot be trusted:\n" +
-                    ToText(report),
-                "ORACLE_BREAKS_CONTRACT");
-  }
-  if (!report.reach || !std::isfinite(*report.reach)) {
-    return Fail(ErrorCode::kOracleFailed,
-                "the reach is taken from the oracle's answers, and they show none: say how large "
-                "epsilon should be",
-                "ORACLE_NO_REACH");
-  }
-  return ChosenEpsilon{Rounded(*report.reach / doctor::kAutoEpsilon),
-                       "a quarter of the reach, about " + Show("%.3g", *report.reach) + " by " +
-                           std::to_string(report.queries) + " queries"};
-}
 
 void client::Tell(const std::string& epsilon_reason, Report* report) {
   if (epsilon_reason.empty()) return;

@@ -11,8 +11,6 @@ namespace stellate::client {
 // Adds to a report why the epsilon of its mesh was chosen, which the server does not know; empty:
 // it was given.
 void Tell(const std::string& epsilon_reason, Report* report);
-// What ChooseEpsilon says of a Check that was made.
-Expected<ChosenEpsilon> ChooseEpsilon(CheckReport report);
 // The next automatic epsilon after a mesh with this report; none: a smaller
 // one would mend nothing.
 std::optional<ChosenEpsilon> Finer(const Report& report);

@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "net/channel.h"
-#include "net/embedded_server.h"
 #include "net/reconnect.h"
+#include "run/host.h"
 #include "stellate/download.h"
 #include "stellate/v1/stellate.grpc.pb.h"
 #include "wire/status.h"
@@ -186,23 +186,13 @@ Expected<void> Check(const Eigen::MatrixXd& points, const ReconstructOptions& op
 Expected<Mesh> Reconstruct(const Eigen::MatrixXd& points, const ReconstructOptions& options,
                            const Eigen::MatrixXd& tangents) {
   if (auto ok = client::Check(points, options, tangents); !ok) return tl::unexpected(ok.error());
-  std::unique_ptr<client::EmbeddedServer> embedded;
-  DownloadOptions download;
-  download.connection = options.connection;
-  if (options.connection.server.empty()) {
-    auto started = client::EmbeddedServer::Start();
-    if (!started) return tl::unexpected(started.error());
-    embedded = std::move(*started);
-    download.connection.server = embedded->address();
-    download.connection.credentials = {};
-    download.connection.keepalive = client::kNoPings;
-  }
-  const auto channel = client::Connect(download.connection);
-  if (!channel) return tl::unexpected(channel.error());
-  client::Upload upload(*channel, points, tangents, options,
-                        [&embedded] { return embedded && !embedded->alive(); });
+  const Expected<client::Host> host = client::Host::Find(options.connection);
+  if (!host) return tl::unexpected(host.error());
+  client::Upload upload(host->channel, points, tangents, options, host->IsHopeless());
   const Expected<std::string> name = upload.Go();
   if (!name) return tl::unexpected(name.error());
+  DownloadOptions download;
+  download.connection = host->connection;
   download.unfinished = Unfinished::kWait;
   download.on_progress = options.on_progress;
   download.stop = options.stop;

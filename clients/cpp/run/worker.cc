@@ -33,14 +33,18 @@ std::uint32_t MaxChunkQueries(const Oracle& oracle) {
   return static_cast<std::uint32_t>(std::max<size_t>(1, kChunkBytes / (8 * numbers)));
 }
 
-std::string DescriptionOf(const std::exception_ptr& exception) {
+void Describe(const std::exception_ptr& exception, v1::OracleFailure* failure) {
+  std::string what = "an exception that is no std::exception";
   try {
     std::rethrow_exception(exception);
+  } catch (const OracleError& e) {
+    failure->set_reason(e.reason());
+    what = e.what();
   } catch (const std::exception& e) {
-    return e.what();
+    what = e.what();
   } catch (...) {
-    return "an exception that is no std::exception";
   }
+  failure->set_message(what.substr(0, kMaxFailureBytes));
 }
 
 void NoteEnd(const v1::ServeOracleResponse& response, std::optional<MeshState>* state) {
@@ -158,7 +162,7 @@ bool Worker::AnswerOrFail(const v1::QueryChunk& chunk, v1::ServeOracleRequest* r
     exception_ = std::current_exception();
     request->Clear();
     request->mutable_failure()->set_lease(chunk.lease());
-    request->mutable_failure()->set_message(DescriptionOf(exception_).substr(0, kMaxFailureBytes));
+    Describe(exception_, request->mutable_failure());
     return true;
   }
 }

@@ -43,8 +43,7 @@ def _sources() -> list[pathlib.Path]:
 
 def _carried() -> dict[str, pathlib.Path]:
     """What is carried beside the stubs, by its path there."""
-    files = {path.name: path for path in _SHARED.iterdir() if path.suffix in (".txt", ".toml")}
-    return dict(sorted(files.items()))
+    return {path.name: path for path in sorted(_SHARED.glob("*.toml"))}
 
 
 def _fingerprint(sources: list[pathlib.Path]) -> str:

@@ -16,7 +16,6 @@
 #include <vector>
 
 #include "stellate/catalogue.h"
-#include "stellate/doctor.h"
 
 namespace stellate {
 namespace {
@@ -119,20 +118,6 @@ TEST_F(CommandOracle, TangentsComeAlongOnceTheyWereAskedFor) {
   // On the axis: no closest point, and that is an answer, but not for tangents.
   EXPECT_FALSE(oracle->ClosestPoint(Eigen::Vector3d::Zero()).IsFound(0));
   EXPECT_THROW(oracle->TangentBasis(Eigen::Vector3d::Zero()), std::runtime_error);
-}
-
-TEST_F(CommandOracle, DoctorFindsNothingWrongWithTheShippedOnes) {
-  for (const std::string& command :
-       {"perl " + Shipped("torus.pl"), "perl " + Shipped("clifford.pl"),
-        "mawk -W interactive -f " + Shipped("clifford.awk")}) {
-    CommandOptions options = Options(command);
-    options.processes = 2;
-    const auto oracle = Start(options);
-    ASSERT_NE(oracle, nullptr);
-    const CheckReport report = Check(*oracle);
-    EXPECT_TRUE(report.ok()) << ToText(report);
-    EXPECT_EQ(report.pieces, 1);
-  }
 }
 
 TEST_F(CommandOracle, FlatsAndSizesGoThroughBothFramings) {

@@ -173,7 +173,7 @@ TEST(Exactness, IsToldToAllThreads) {
 TEST(Exactness, IsAFindingOfTheDoctors) {
   const auto single = [](const Point& x) { return UnitSphere(AllAsSingle(x)); };
   SignedDistance oracle(single, {}, BoxOf(0));
-  const CheckReport report = Check(oracle);
+  const CheckReport report = Check(oracle).value();
   const Finding* const finding = report.Find("INEXACT");
   ASSERT_NE(finding, nullptr) << ToText(report);
   EXPECT_THAT(finding->message, HasSubstr("f is exact to"));

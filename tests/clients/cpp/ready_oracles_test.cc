@@ -65,7 +65,7 @@ TEST_P(Lawful, KeepsTheLawsOfOracles) {
 }
 
 TEST_P(Blessed, HasTheDoctorsBlessing) {
-  const CheckReport report = Check(*oracle_);
+  const CheckReport report = Check(*oracle_).value();
   EXPECT_TRUE(report.ok()) << ToText(report);
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "stellate/connection.h"
+#include "stellate/doctor.h"
 #include "stellate/error.h"
 #include "stellate/mesh.h"
 #include "stellate/oracle.h"
@@ -73,15 +74,6 @@ struct MeshOptions {
   std::optional<Seconds> worker_wait, answer_time, busy_time;  // limits of the workers
   std::string label;  // shown in the server's lists and logs
 };
-
-struct ChosenEpsilon {
-  double epsilon = 0;
-  std::string reason;  // a sentence
-};
-
-// Returns a quarter of the reach that Check estimates, to two digits. kOracleFailed, with the
-// findings, if the oracle breaks its contract.
-Expected<ChosenEpsilon> ChooseEpsilon(Oracle& oracle);
 
 // Meshes the oracle's manifold: offers the oracle to the server and collects the mesh.
 //

@@ -1,17 +1,21 @@
-// Check where equations lose rank: crossings, tips, bars on one line.
+// Where equations lose rank: crossings, tips, bars on one line.
+#include "run/rank.h"
+
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <functional>
+#include <limits>
 #include <memory>
+#include <optional>
 #include <ostream>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "stellate/catalogue.h"
-#include "stellate/doctor.h"
 #include "stellate/oracles.h"
 #include "stellate/oracles/walls.h"
-#include "support/spoiled_oracle.h"
 
 namespace stellate {
 namespace {
@@ -55,26 +59,12 @@ void PrintTo(const Crossing& crossing, std::ostream* out) { *out << crossing.nam
 
 class LosesRank : public ::testing::TestWithParam<Crossing> {};
 
-// The numbers of "... near [1, 2, 3]: ...".
-Place PlaceIn(const std::string& message) {
-  std::vector<double> numbers;
-  const char* at = message.c_str() + message.find('[');
-  while (*at == '[' || *at == ',') {
-    char* end = nullptr;
-    numbers.push_back(std::strtod(at + 1, &end));
-    at = end;
-  }
-  return Eigen::Map<const Place>(numbers.data(), std::ssize(numbers));
-}
-
 TEST_P(LosesRank, AndIsToldWhere) {
   const std::unique_ptr<Oracle> oracle = GetParam().make();
-  const CheckReport report = Check(*oracle);
-  const Finding* const finding = report.Find("SINGULAR");
-  ASSERT_NE(finding, nullptr) << ToText(report);
-  EXPECT_EQ(finding->severity, Severity::kError);
-  EXPECT_LT(GetParam().off(PlaceIn(finding->message)), 1e-4) << finding->message;
-  EXPECT_NE(finding->advice.find("no epsilon will do"), std::string::npos);
+  const std::optional<client::Singular> singular = client::FindSingular(*oracle, 1);
+  ASSERT_TRUE(singular.has_value());
+  EXPECT_LT(GetParam().off(singular->place), 1e-4) << singular->place.transpose();
+  EXPECT_LT(singular->ratio, 1e-5);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -99,22 +89,45 @@ INSTANTIATE_TEST_SUITE_P(
                                [](const Place& p) { return p.lpNorm<1>(); }}),
     [](const auto& one) { return one.param.name; });
 
-TEST(Check, CallsNoSteepOrFlatEquationsSingular) {
+TEST(FindSingular, CallsNoSteepOrFlatEquationsSingular) {
   const auto needle = [](const Place& x) {
     return Place::Constant(1, x.head(2).squaredNorm() + 900 * x[2] * x[2] - 1);
   };
   const std::unique_ptr<Oracle> regular[] = {Tip(1e-3), Tip(-1e-3), Equations(1, needle),
                                              ThreeBars(1.01)};
-  for (const auto& oracle : regular) {
-    const CheckReport report = Check(*oracle);
-    EXPECT_EQ(report.Find("SINGULAR"), nullptr) << ToText(report);
-  }
+  for (const auto& oracle : regular) EXPECT_FALSE(client::FindSingular(*oracle, 1));
 }
 
-TEST(Check, LeavesATipAloneThatIsCutOut) {
+TEST(FindSingular, LeavesATipAloneThatIsCutOut) {
   oracles::Clipped half(Tip(0), {oracles::HalfSpace(Eigen::Vector3d::UnitX(), 0.2)});
-  const CheckReport report = Check(half);
-  EXPECT_EQ(report.Find("SINGULAR"), nullptr) << ToText(report);
+  EXPECT_FALSE(client::FindSingular(half, 1));
+}
+
+TEST(FindSingular, FindsNothingWhereThereAreNoEquations) {
+  EXPECT_FALSE(client::FindSingular(*MakeManifold("torus:1:0.4").value(), 1));
+}
+
+// Of a sphere, with gradients that are not.
+class Misshapen final : public ImplicitOracle {
+ public:
+  explicit Misshapen(Eigen::MatrixXd gradients)
+      : ImplicitOracle(
+            2, 3, [](const Place& x) { return Place::Constant(1, x.squaredNorm() - 1); },
+            Jacobian(), BoundingBox{Place::Constant(3, -1.5), Place::Constant(3, 1.5)}),
+        gradients_(std::move(gradients)) {}
+  Eigen::MatrixXd EquationGradients(const Eigen::MatrixXd& points) override {
+    return gradients_.replicate(1, points.cols());
+  }
+
+ private:
+  const Eigen::MatrixXd gradients_;
+};
+
+TEST(FindSingular, SaysWhatIsWrongWithGradients) {
+  Misshapen two(Eigen::MatrixXd::Ones(2, 1));
+  EXPECT_THROW(client::FindSingular(two, 1), OracleError);
+  Misshapen infinite(Eigen::MatrixXd::Constant(3, 1, std::numeric_limits<double>::infinity()));
+  EXPECT_THROW(client::FindSingular(infinite, 1), OracleError);
 }
 
 }  // namespace

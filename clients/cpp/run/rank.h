@@ -1,0 +1,22 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+
+#include "stellate/oracle.h"
+
+namespace stellate::client {
+
+// Where the equations that M is given by lose rank.
+struct Singular {
+  Eigen::VectorXd place;  // a point of M next to it
+  double ratio = 0;       // the Jacobian's least singular value there, of the median on M
+};
+
+// Follows the least singular value of the equations' Jacobian down along M, from where it is
+// smallest, which only the client can do. Nothing: they keep their rank, or there are none. Throws
+// what the oracle throws.
+std::optional<Singular> FindSingular(Oracle& oracle, std::uint64_t random_seed);
+
+}  // namespace stellate::client
