@@ -17,8 +17,15 @@ SCRIPTS = sorted(path for path in FIGURES.glob("*.py") if not path.stem.startswi
 LIKENESS = 6.0
 
 
+def last_frame(path: pathlib.Path) -> Image.Image:
+    """Of an animation, whose other frames depend on when it was looked at: how it ends."""
+    picture = Image.open(path)
+    picture.seek(getattr(picture, "n_frames", 1) - 1)
+    return picture
+
+
 def difference(one: pathlib.Path, other: pathlib.Path) -> float:
-    pictures = [Image.open(path).convert("L") for path in (one, other)]
+    pictures = [last_frame(path).convert("L") for path in (one, other)]
     if pictures[0].size != pictures[1].size:
         return 255.0
     values = [np.asarray(picture, dtype=float) for picture in pictures]
@@ -27,17 +34,18 @@ def difference(one: pathlib.Path, other: pathlib.Path) -> float:
 
 def main() -> int:
     wrong = []
-    shown = {path.stem for path in FIGURES.glob("*.png")}
+    pictures = {path.stem: path for path in FIGURES.iterdir() if path.suffix in (".png", ".gif")}
     drawn = {path.stem for path in SCRIPTS}
-    wrong += [f"no script draws docs/figures/{name}.png" for name in sorted(shown - drawn)]
+    undrawn = sorted(pictures.keys() - drawn)
+    wrong += [f"no script draws docs/figures/{pictures[name].name}" for name in undrawn]
     with tempfile.TemporaryDirectory() as folder:
         for script in SCRIPTS:
             subprocess.run(["/usr/bin/python3", "-B", script, folder], check=True)
-            picture = pathlib.Path(folder) / f"{script.stem}.png"
-            apart = difference(picture, FIGURES / picture.name)
+            shown = pictures[script.stem]
+            apart = difference(pathlib.Path(folder) / shown.name, shown)
             print(f"{script.stem}: {apart:.1f} of 255 from the one that is shown")
             if apart > LIKENESS:
-                wrong.append(f"{picture.name} is not what {script.name} draws now: run it")
+                wrong.append(f"{shown.name} is not what {script.name} draws now: run it")
         # That it can fail at all.
         mirrored = pathlib.Path(folder) / "mirrored.png"
         ImageOps.mirror(Image.open(FIGURES / "rules.png").convert("RGB")).save(mirrored)
