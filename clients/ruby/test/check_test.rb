@@ -32,4 +32,14 @@ class CheckTest < Minitest::Test
     assert_equal 'RAISED', first.code
     assert_includes first.message, 'no such surface'
   end
+
+  def test_a_server_that_is_named_is_asked_and_left_as_it_was
+    Stellate::Server.start do |server|
+      client = Stellate::Client.new(server)
+      assert client.check(Live::TORUS).ok
+      assert_empty client.list.to_a
+      error = assert_raises(Stellate::InvalidArgument) { client.check(Live::TORUS, epsilon: -1) }
+      assert_includes error.message, 'epsilon'
+    end
+  end
 end

@@ -14,13 +14,13 @@ class EpsilonTest < Minitest::Test
     def dimension = 1
     def ambient_dimension = 2
     def bounding_box = [[-1.1, -1.1], [1.2, 1.1]]
-    def seeds = [[-1.0, 0.0], [1.05, 0.005]]
+    def seeds = [[-1.0, 0.0], [1.05, 0.01]]
 
     def closest_point(points)
       @asked = asked.to_i + points.size
       points.map do |x, y|
         away, beside = Math.sqrt((x * x) + (y * y)), Math.sqrt(((x - 1.05) * (x - 1.05)) + (y * y))
-        from, scale = (away - 1).abs <= (beside - 0.005).abs ? [0, 1 / away] : [1.05, 0.005 / beside]
+        from, scale = (away - 1).abs <= (beside - 0.01).abs ? [0, 1 / away] : [1.05, 0.01 / beside]
         [from + (scale * (x - from)), scale * y]
       end
     end

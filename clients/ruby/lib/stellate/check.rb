@@ -1,22 +1,13 @@
 # frozen_string_literal: true
 
-# The doctor: whether an oracle is what it should be, and how large epsilon may be. The program `stellate`
-# asks the questions, for clients in all languages alike.
+# The doctor: whether an oracle is what it should be, and how large epsilon may be. A server asks the
+# questions, for clients in all languages alike.
 module Stellate
   # Probes an oracle for its contract, before a mesh is made of its answers: a V1::CheckReport with `ok`,
   # `findings`, `text`, `reach` and more (doctor.proto). What it raises is a finding, too. `epsilon`: that a
-  # mesh is planned with.
+  # mesh is planned with. A private server asks; see Client#check for another.
   def self.check(oracle, epsilon: 0)
-    Server.start_doctor do |doctor|
-      client = Client.new(doctor)
-      name = client.create(oracle, epsilon:).name
-      failure = attempt { client.serve(oracle, name) }
-      begin
-        client.check_report(name)
-      rescue StellateError
-        raise failure || $ERROR_INFO # there was no examination
-      end
-    end
+    Server.start { |server| Client.new(server).check(oracle, epsilon:) }
   end
 
   # A quarter of the reach that `check` finds, to two digits, and a word about it: what `mesh` takes for the
@@ -28,14 +19,4 @@ module Stellate
     problem = report.no_epsilon
     raise error_class(problem.reason).new(problem.message, reason: problem.reason)
   end
-
-  def self.attempt
-    yield
-    nil
-  rescue Interrupt
-    raise
-  rescue Exception => e # rubocop:disable Lint/RescueException
-    e
-  end
-  private_class_method :attempt
 end

@@ -114,12 +114,20 @@ module Stellate
       call(:get_server_info, V1::GetServerInfoRequest.new)
     end
 
-    # What the doctor found, if this is a connection to it.
-    def check_report(name)
-      doctor = V1::Doctor::Stub.new(@address, :this_channel_is_insecure)
-      doctor.get_check_report(V1::GetCheckReportRequest.new(name:), deadline: Time.now + RECONNECT[:call])
+    # Has this server examine an oracle: see Stellate.check.
+    def check(oracle, epsilon: 0)
+      request = V1::ExamineRequest.new(spec: spec(oracle, epsilon, {}))
+      examination = stub.examine(request, metadata:, return_op: true)
+      failure = report = nil
+      examination.execute.each do |event|
+        failure = why_left(oracle, event.mesh.name) if event.mesh
+        report = event.report || report
+      end
+      report or raise Stellate.protocol_error('it ended an examination without a report')
     rescue GRPC::BadStatus => e
-      raise Stellate.from_rpc(e)
+      raise failure || Stellate.from_rpc(e) # there was no examination
+    ensure
+      examination&.cancel
     end
 
     # Serves a mesh with this oracle until it is over; the state that it ended in, e.g. "SUCCEEDED".
@@ -145,6 +153,16 @@ module Stellate
     end
 
     private
+
+    # Answers until the examination is over; what ended that early, which the server knows of.
+    def why_left(oracle, name)
+      serve(oracle, name, worker: 'check')
+      nil
+    rescue Interrupt
+      raise
+    rescue Exception => e # rubocop:disable Lint/RescueException
+      e
+    end
 
     def channel_args(keepalive_seconds)
       ping = keepalive_seconds ? (1000 * keepalive_seconds).to_i : NO_PINGS

@@ -18,25 +18,9 @@ module Stellate
       )
   end
 
-  # The command-line program: beside the server binary, else on PATH.
-  def self.find_stellate
-    beside = begin
-      [File.dirname(find_stellated)]
-    rescue ServerNotFound
-      [] # one that is on PATH without its server will do
-    end
-    folders = beside + ENV.fetch('PATH', '').split(':')
-    folders.map { |folder| File.join(folder, 'stellate') }
-           .find { |path| File.file?(path) && File.executable?(path) } or
-      raise ServerNotFound.new(
-        "the program 'stellate', which examines oracles, is neither beside stellated nor on PATH: install it, " \
-        'or build it (clients/quickstart does)', reason: 'SERVER_NOT_FOUND'
-      )
-  end
-
   # A stellated of this process's own, which ends with it whatever happens.
   class Server
-    SAID = /\Astellated? (doctor )?listening on /
+    SAID = /\Astellated listening on /
     STOP_SECONDS = 10
     # When its client goes there is nobody left to finish a mesh for. One that answers no pings is merely
     # busy in an oracle.
@@ -51,12 +35,7 @@ module Stellate
     # name since Ruby 3.1 forwards none without where there are keywords.)
     def self.start(*flags, listen: nil, binary: Stellate.find_stellated, &block)
       own = OWN_FLAGS + (listen ? [] : PRIVATE_FLAGS)
-      closing(new([binary], listen, own + flags), &block)
-    end
-
-    # The doctor, to which an oracle is served as to a server: see Stellate.check.
-    def self.start_doctor(&block)
-      closing(new([Stellate.find_stellate, 'doctor'], nil, []), &block)
+      closing(new(binary, listen, own + flags), &block)
     end
 
     # The server, or, with a block, what that makes of it before it is closed.
@@ -70,12 +49,12 @@ module Stellate
       end
     end
 
-    def initialize(program, listen, flags)
+    def initialize(binary, listen, flags)
       @folder = Dir.mktmpdir('stellate-')
       @log = File.join(@folder, 'log')
       @private = listen.nil?
       address = listen || "unix:#{File.join(@folder, 'socket')}"
-      command = [*program, '--exit-with-parent', '--listen', address, *flags]
+      command = [binary, '--exit-with-parent', '--listen', address, *flags]
       # A group of its own: Ctrl-C is for the client, which cancels its meshes first.
       said, write = IO.pipe
       @pid = Process.spawn(*command, in: :close, out: write, err: @log, pgroup: true)
