@@ -177,6 +177,25 @@ Status CheckTangent(const Specification& spec, const QueryBlock& block, Index qu
   return Status::Ok();
 }
 
+// As kLeastTransversality, 3 degrees, where the angle inside M is nearly straight: there is no thin
+// wedge of M, and none beyond it. With labels any of the four wedges may be one.
+constexpr double kLeastBlunt = 0.0013;
+// Cosine of conormals of which that is asked.
+constexpr double kBlunt = 0.9;
+
+// Whether walls cross at an angle, but for two of them or more that are nearly one inside of M: all
+// others cross the edge between these. `along`: conormals in tangent coordinates.
+bool CrossBluntly(Eigen::MatrixXd along) {
+  for (Index j = 1; j < along.cols(); ++j)
+    for (Index i = 0; i < j; ++i) {
+      const double cosine = along.col(i).dot(along.col(j));
+      if (cosine <= kBlunt) continue;
+      if (1 - cosine < kLeastBlunt) return false;
+      along.col(j) = (along.col(j) - cosine * along.col(i)).normalized();
+    }
+  return EigenvaluesOfSymmetric(along.transpose() * along)[0] >= kLeastTransversality;
+}
+
 // Describes walls that meet nearly tangentially: the two that do most, and their angle inside M.
 // `along`: conormals in tangent coordinates, by ascending wall.
 std::string NameTangential(WallSet walls, const Eigen::MatrixXd& along) {
@@ -252,7 +271,8 @@ Status CheckConormals(const Specification& spec, const QueryBlock& block, Index 
                   " vanish together, but at ", NamePoint(answer.points.col(j)),
                   ", on all of them, their conormals are independent");
   const double independent = eigenvalues[dependent];
-  if (independent >= kLeastTransversality) return Status::Ok();
+  if (independent >= kLeastTransversality || (spec.labels.empty() && CrossBluntly(along)))
+    return Status::Ok();
   return refuse("the walls meet nearly tangentially: ", NameTangential(block.face, along), ", at ",
                 NamePoint(answer.points.col(j)),
                 "; the smallest eigenvalue of their conormals' Gram matrix is ", independent,

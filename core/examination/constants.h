@@ -55,6 +55,8 @@ inline constexpr double kFarthestMiddle = 0.75;  // of the way between two point
                                                  // closest point, from either
 inline constexpr double kLeastSteepness = 0.03;  // of a wall's median slope along M, for it to
                                                  // cross M there
+inline constexpr double kLeastBlunt = 0.0013;    // of 1 + cosine, where a server takes walls
+                                                 // that are nearly one inside of M
 inline constexpr double kAcuteDegrees = 50;  // inside a solid, below which refinement may not end
 inline constexpr double kFlatReach = 0.5;    // of the size, what the reach is taken for where
                                              // nothing bends

@@ -231,7 +231,7 @@ void WallLaws::JudgeAngles(int wall, int other, const MatrixXd& y, const FaceAns
     const double cosine = -at.conormals.col(j).dot(at.others.col(j));
     const double degrees = DegreesOfCosine(cosine);
     const Vector query = y.col(j);
-    if (1 - std::abs(cosine) < kLeastTransversality) {
+    if (1 - std::abs(cosine) < (cosine > 0 ? kLeastTransversality : kLeastBlunt)) {
       Add("WALLS_TANGENTIAL",
           {{"wall", wall}, {"other", other}, {"query", query}, {"degrees", degrees}});
     } else if (degrees < kAcuteDegrees && probe_.k() > 2) {

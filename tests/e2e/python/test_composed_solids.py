@@ -224,3 +224,28 @@ def test_a_cone_is_meshed_where_its_tip_is_cut_away(server):
     mesh = stellate.mesh(cut, 0.25, server=server)
     hold(mesh, 1, 3)
     assert volume(mesh) == pytest.approx(np.pi * 0.75 / 3 * (1 + 0.5 + 0.25), rel=0.04)
+
+
+def test_a_lid_with_a_nearly_flat_ridge(server):
+    """Two walls at 172 degrees, which end in corners with a third: nothing of the solid is thin there."""
+    tilt = np.radians(4)
+    lid = s.HalfSpace([np.sin(tilt), 0, -np.cos(tilt)], -0.5 * np.cos(tilt))
+    lid = lid & s.HalfSpace([-np.sin(tilt), 0, -np.cos(tilt)], -0.5 * np.cos(tilt))
+    turn = s.rotation([1, 2, 3], 0.7)
+    mesh = stellate.mesh((s.Box([-1, -1, -0.5], [1, 1, 2]) & lid).rotated(turn), 0.3, server=server)
+    assert mesh.certified, mesh.report
+    assert euler_characteristic(mesh.simplices) == 1 and len(mesh.boundary) == 7
+    assert volume(mesh) == pytest.approx(4 - 2 * np.tan(tilt), rel=1e-12)
+    back = mesh.points @ turn
+    ridges = [e for e in mesh.edges if np.abs(back[np.unique(e.simplices)][:, 0]).max() < 1e-9]
+    assert len(ridges) == 1 and len(ridges[0].walls) == 2
+
+
+def test_a_ball_with_a_shallow_cut(server):
+    """A plane and a sphere at 168 degrees: the walls' conormals are nearly one."""
+    height = np.cos(np.radians(12))
+    mesh = stellate.mesh(s.Ball() - s.HalfSpace([0, 0, 1], height), 0.09, server=server)
+    hold(mesh, 1, 2)
+    (rim,) = mesh.edges
+    on = mesh.points[np.unique(rim.simplices)]
+    assert np.abs(norm(on[:, :2], axis=1) - np.sin(np.radians(12))).max() < 1e-9
