@@ -14,6 +14,7 @@ import collections
 import dataclasses
 import sys
 import time
+from collections.abc import Iterable
 
 import numpy as np
 import stellate
@@ -124,19 +125,10 @@ def table(runs: list[Run]) -> str:
     return "\n".join(lines)
 
 
-def main() -> int:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--runs", type=int, default=300, help="how many (300)")
-    parser.add_argument("--seed", type=int, default=1, help="of all that is random (1)")
-    parser.add_argument("--family", action="append", choices=FAMILIES, help="these alone")
-    parser.add_argument("--case", type=int, help="the one run of this number, with its words")
-    parser.add_argument("--verbose", action="store_true", help="a line for each run")
-    given = parser.parse_args()
-    families = given.family or [name for name in FAMILIES if name not in _LATE]
-    numbers = range(given.runs) if given.case is None else [given.case]
-    runs = []
+def _run_all(
+    numbers: Iterable[int], families: list[str], given: argparse.Namespace, runs: list[Run]
+) -> None:
+    """Adds to runs, and prints what was not right."""
     with stellate.Server() as server:
         for number in numbers:
             family = families[number % len(families)]
@@ -150,6 +142,25 @@ def main() -> int:
                     f"{': ' if run.words else ''}{run.words}",
                     flush=True,
                 )
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--runs", type=int, default=300, help="how many (300)")
+    parser.add_argument("--seed", type=int, default=1, help="of all that is random (1)")
+    parser.add_argument("--family", action="append", choices=FAMILIES, help="these alone")
+    parser.add_argument("--case", type=int, help="the one run of this number, with its words")
+    parser.add_argument("--verbose", action="store_true", help="a line for each run")
+    given = parser.parse_args()
+    families = given.family or [name for name in FAMILIES if name not in _LATE]
+    numbers = range(given.runs) if given.case is None else [given.case]
+    runs: list[Run] = []
+    try:
+        _run_all(numbers, families, given, runs)
+    except KeyboardInterrupt:
+        print("interrupted: what there is")
     print(table(runs))
     right = sum(run.outcome == "right" for run in runs)
     false = sum(run.outcome == "false" for run in runs)

@@ -31,6 +31,9 @@ _HALF = 1.8  # of the box's side; the ball's and the cylinder's radius is a litt
 _SHARE = 0.35  # of what bends and of half of what is thick
 _LEAST, _MOST = 0.14, 0.5  # of epsilon, where a period is 2 pi
 _GRID = 72
+_STARTS = 700
+_BOUNDS = [10, 15, 20, 30]
+_CLASSES = ["0 to 10", "10 to 15", "15 to 20", "20 to 30", "30 degrees or more"]
 
 
 def gyroid(x: Any) -> Any:
@@ -181,6 +184,27 @@ class Cut:
 
         return Truth(values, label, self.level.bend, {1: None}, thrown(label, 1.25 * _HALF, 3, [1]))
 
+    def sharpest(self) -> float:
+        """The least angle, in degrees, at which walls meet, and of a straight angle what is left.
+
+        By Newton's method from random points to where a side of the container, or two, and the level
+        set are zero. Where three meet: the angle of two, if these had the Gram matrix's least eigenvalue.
+        """
+        _, sides = self.container()
+        x = np.random.default_rng(3).uniform(-1.3, 1.3, (_STARTS, 3)) * _HALF
+        count, least = sides(x[:1]).shape[1], 90.0
+        for sign, at in self.level.walls():
+
+            def zeros(x: np.ndarray, at: float = at, sign: float = sign) -> np.ndarray:
+                g = sign * (self.level.g(x + self.centre) - at)
+                return np.concatenate([sides(x), g[:, None]], axis=1)
+
+            groups = [(i, count) for i in range(count)]
+            groups += [(*both, count) for both in itertools.combinations(range(count), 2)]
+            for group in groups:
+                least = min(least, _meeting(zeros, list(group), x, self.level, self.centre))
+        return least
+
     def pieces(self) -> int:
         """Components that a grid shows, of more than a few of its points; their number at least."""
         line = np.linspace(-1.25 * _HALF, 1.25 * _HALF, _GRID)
@@ -188,6 +212,29 @@ class Cut:
         inside = self.truth().label(x).reshape(_GRID, _GRID, _GRID) > 0
         marks, count = scipy.ndimage.label(inside, np.ones((3, 3, 3)))
         return int((np.bincount(marks.ravel())[1:] > 30).sum()) if count else 0
+
+
+def _meeting(
+    zeros: Any, group: list[int], x: np.ndarray, level: Level, centre: np.ndarray
+) -> float:
+    h = 1e-5
+    for _ in range(14):
+        rows = np.stack([(zeros(x + v) - zeros(x - v)) / (2 * h) for v in h * np.eye(3)], axis=2)
+        across = rows[:, group]
+        gram = across @ np.swapaxes(across, 1, 2) + 1e-9 * np.eye(len(group))
+        steps = np.swapaxes(across, 1, 2) @ np.linalg.solve(gram, zeros(x)[:, group, None])
+        x = x - np.clip(steps[..., 0], -0.5, 0.5)
+    values = zeros(x)
+    there = (np.abs(values[:, group]) < 1e-7).all(axis=1) & (values > -1e-6).all(axis=1)
+    there &= np.all(
+        [sign * (level.g(x + centre) - at) > -1e-6 for sign, at in level.walls()], axis=0
+    )
+    if not there.any():
+        return 90.0
+    normals = rows[there][:, group]
+    normals /= norm(normals, axis=2, keepdims=True)
+    eigenvalues = np.linalg.eigvalsh(normals @ np.swapaxes(normals, 1, 2))[:, 0]
+    return float(np.degrees(np.arccos(1 - eigenvalues.min())))
 
 
 @dataclasses.dataclass
@@ -201,6 +248,7 @@ class Run:
     vertices: int = 0
     seconds: float = 0.0
     angle: float = 180.0
+    meeting: float = 90.0  # degrees, the least angle of walls
 
 
 def periodic(level: Level) -> Any:
@@ -233,12 +281,16 @@ def _judge_period(mesh: Any, cell: Any, level: Level, epsilon: float) -> list[st
     return wrong
 
 
-def one(surface: str, kind: str, place: str, fraction: float, seed: int, server: Any) -> Run:
+def one(
+    surface: str, kind: str, place: str, fraction: float, seed: int, places: int, server: Any
+) -> Run:
     run = Run(surface, kind, place, fraction)
     level = level_of(surface, kind, fraction)
     rng = np.random.default_rng([seed, *map(ord, surface + kind + place), int(100 * fraction)])
     motion = Motion.random(rng, 3)
-    cut = Cut(level, place, rng.uniform(0, 2 * np.pi, 3), motion)
+    if place != "periodic":
+        some = [Cut(level, place, rng.uniform(0, 2 * np.pi, 3), motion) for _ in range(places)]
+        run.meeting, cut = max(((c.sharpest(), c) for c in some), key=lambda both: both[0])
     began = time.monotonic()
     try:
         if place == "periodic":
@@ -282,6 +334,8 @@ def table(runs: list[Run]) -> str:
         groups[f"{run.surface}, {run.kind}"].append(run)
         groups[f"in a {run.place}" if run.place != "periodic" else "periodic"].append(run)
         groups[f"{run.kind}, fraction {run.fraction:g}"].append(run)
+        if run.place != "periodic":
+            groups[f"walls meet at {_CLASSES[np.searchsorted(_BOUNDS, run.meeting)]}"].append(run)
         groups["all"].append(run)
     order = sorted(
         groups, key=lambda g: (g == "all", "fraction" in g, "in a" in g or g == "periodic")
@@ -300,6 +354,20 @@ def table(runs: list[Run]) -> str:
     return "\n".join(lines)
 
 
+def _run_all(cases: list[tuple[int, Any]], given: argparse.Namespace, runs: list[Run]) -> None:
+    """Adds to runs, and prints each."""
+    with stellate.Server() as server:
+        for number, case in cases:
+            run = one(*case, given.seed, given.places, server)
+            runs.append(run)
+            print(
+                f"{number:4d} {run.surface}, {run.kind}, {run.place}, {run.fraction:g}, walls at "
+                f"{run.meeting:.0f} degrees: {run.outcome}, "
+                f"{run.vertices} vertices, {run.seconds:.1f} s{': ' if run.words else ''}{run.words}",
+                flush=True,
+            )
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -310,6 +378,12 @@ def main() -> int:
     parser.add_argument("--kind", action="append", choices=KINDS)
     parser.add_argument("--within", action="append", choices=PLACES)
     parser.add_argument("--fractions", default=".1,.2,.3,.4,.5,.6,.7,.8,.9")
+    parser.add_argument(
+        "--places",
+        type=int,
+        default=3,
+        help="of so many random ones that of the largest angles (3)",
+    )
     parser.add_argument("--case", type=int, help="the one run of this number")
     given = parser.parse_args()
     fractions = [float(f) for f in given.fractions.split(",")]
@@ -321,16 +395,11 @@ def main() -> int:
     numbers = list(np.random.default_rng(1).permutation(len(cases)))[: given.runs]
     if given.case is not None:
         numbers = [given.case]
-    runs = []
-    with stellate.Server() as server:
-        for number in numbers:
-            run = one(*cases[number], given.seed, server)
-            runs.append(run)
-            print(
-                f"{number:4d} {run.surface}, {run.kind}, {run.place}, {run.fraction:g}: {run.outcome}, "
-                f"{run.vertices} vertices, {run.seconds:.1f} s{': ' if run.words else ''}{run.words}",
-                flush=True,
-            )
+    runs: list[Run] = []
+    try:
+        _run_all([(number, cases[number]) for number in numbers], given, runs)
+    except KeyboardInterrupt:
+        print("interrupted: what there is")
     print(table(runs))
     return 1 if any(run.outcome == "false" for run in runs) else 0
 
