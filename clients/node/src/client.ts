@@ -8,6 +8,8 @@ import type { ExamineResponse__Output } from "./generated/stellate/v1/ExamineRes
 import type { MeshSpec } from "./generated/stellate/v1/MeshSpec.js";
 import type { Mesh__Output } from "./generated/stellate/v1/Mesh.js";
 import type { ServerInfo__Output } from "./generated/stellate/v1/ServerInfo.js";
+import type { PointsChunk } from "./generated/stellate/v1/PointsChunk.js";
+import type { ReconstructReply__Output } from "./generated/stellate/v1/ReconstructReply.js";
 import type { WatchMeshResponse__Output } from "./generated/stellate/v1/WatchMeshResponse.js";
 import type { ListMeshesResponse__Output } from "./generated/stellate/v1/ListMeshesResponse.js";
 import { RECONNECT } from "./generated/shared.js";
@@ -17,6 +19,7 @@ import { Outage, type Patience } from "./retry.js";
 import { Server } from "./server.js";
 import { type MeshOptions, meshSpec } from "./spec.js";
 import { Stream } from "./stream.js";
+import type { CheckedPoints } from "./upload.js";
 import { Worker, type WorkerOptions } from "./worker.js";
 import { grpc, Stub } from "./wire.js";
 
@@ -97,6 +100,70 @@ export class Client {
   async createFrom(spec: MeshSpec): Promise<MeshInfo> {
     const call: Unary<object, Mesh__Output> = this.stub.CreateMesh.bind(this.stub);
     return infoFrom(await this.unary(call, { spec }, { once: true }));
+  }
+
+  /** Declares a mesh of points, which waits for them. Not repeated, as create() is not. */
+  async declarePoints(points: CheckedPoints): Promise<MeshInfo> {
+    try {
+      const reply = await this.sendPoints([{ spec: points.spec }]);
+      this.patience.reached = true;
+      return infoFrom(replied(reply));
+    } catch (error) {
+      throw asOurs(error);
+    }
+  }
+
+  /**
+   * Sends the points of a mesh that was declared so. After a break it goes on from what the server has.
+   * Returns once all are recorded, or throws when `signal` is aborted.
+   */
+  async upload(name: string, points: CheckedPoints, signal: AbortSignal): Promise<MeshInfo> {
+    const most = Number((await this.info()).maxMessageBytes);
+    const outage = new Outage(this.patience, true); // the watch tells
+    signal.addEventListener("abort", () => outage.stop());
+    for (;;) {
+      try {
+        const { rows } = await this.sendPoints([{ mesh: name }], signal);
+        const reply = await this.sendPoints(points.chunks(name, Number(rows), most), signal);
+        outage.heard();
+        return infoFrom(replied(reply));
+      } catch (error) {
+        const ours = outage.explain(asOurs(error));
+        if (ours === error || signal.aborted) throw ours;
+        await outage.waitOrThrow(error as grpc.ServiceError, ours);
+      }
+    }
+  }
+
+  /** One call of Reconstruct: these messages, the server's reply. Throws the grpc.ServiceError. */
+  private async sendPoints(
+    chunks: Iterable<PointsChunk>,
+    signal?: AbortSignal,
+  ): Promise<ReconstructReply__Output> {
+    let settle: (error: grpc.ServiceError | null, reply?: ReconstructReply__Output) => void;
+    const reply = new Promise<ReconstructReply__Output>((resolve, reject) => {
+      settle = (error, reply) =>
+        reply ? resolve(reply) : reject(error ?? protocolError("it took points without a reply"));
+    });
+    const call = this.stub.Reconstruct((error, reply) => settle(error, reply));
+    const over = reply.then(
+      () => true,
+      () => true,
+    );
+    const cancel = () => call.cancel();
+    signal?.addEventListener("abort", cancel);
+    if (signal?.aborted) cancel();
+    try {
+      for (const chunk of chunks) {
+        // Where the reader is slow, or the call has ended before all was sent.
+        const drained = new Promise<boolean>((resolve) => call.write(chunk, () => resolve(false)));
+        if (await Promise.race([drained, over])) break;
+      }
+      call.end();
+      return await reply;
+    } finally {
+      signal?.removeEventListener("abort", cancel);
+    }
   }
 
   /** A mesh as it stands. Throws MeshNotFound. */
@@ -237,4 +304,13 @@ export class Client {
       await outage.waitOrThrow(failed, fromRpc(failed));
     }
   }
+}
+
+function replied({ mesh }: ReconstructReply__Output): Mesh__Output {
+  if (!mesh) throw protocolError("it took points without saying of what mesh");
+  return mesh;
+}
+
+function asOurs(error: unknown): StellateError {
+  return error instanceof StellateError ? error : fromRpc(error as grpc.ServiceError);
 }

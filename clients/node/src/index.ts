@@ -9,6 +9,8 @@ export type { Found, Oracle } from "./oracle.js";
 export { progressBar } from "./progress.js";
 export { type MeshInfo, type Progress, type Report } from "./report.js";
 export { findStellated, Server } from "./server.js";
+export { reconstruct, type ReconstructOptions } from "./reconstruct.js";
 export { type Connection, download, mesh, type RunOptions, serve, watch } from "./session.js";
 export type { MeshOptions } from "./spec.js";
+export type { PointOptions } from "./upload.js";
 export { Worker, type WorkerOptions } from "./worker.js";

@@ -27,6 +27,10 @@ export class Mesh {
     readonly walls?: BigUint64Array,
     /** The protocol's Orientation.turned: see orientedSimplices(). */
     readonly turned?: Uint8Array,
+    /** [n], of a reconstruction: what became of each point, "OK", "MERGED", "EDGE"... */
+    readonly places?: string[],
+    /** [n, d], of one from noisy points: the positions that the complex was built on. */
+    readonly smoothed?: Float64Array,
   ) {}
 
   get vertexCount(): number {

@@ -14,6 +14,7 @@ import { bytesOfBits, isSet, joined, sortedOrder, takeBits, takeRows } from "./r
 import { Server } from "./server.js";
 import type { MeshOptions } from "./spec.js";
 import type { Worker, WorkerOptions } from "./worker.js";
+import { Places } from "./places.js";
 import { indices, numbers } from "./wire.js";
 
 const FAREWELL = 2000; // milliseconds that a worker may take to end when nobody waits for it
@@ -46,7 +47,7 @@ export interface RunOptions
 }
 
 /** A client, and what has to be closed after it. */
-async function connect(options: Connection): Promise<[Client, () => Promise<void>]> {
+export async function connect(options: Connection): Promise<[Client, () => Promise<void>]> {
   const { server, credentials, reconnectSeconds, keepaliveSeconds, onOutage } = options;
   if (server instanceof Client) {
     if (credentials) throw new InvalidArgument("a Client has its credentials already");
@@ -150,11 +151,12 @@ export async function download(
   }
 }
 
-async function assemble(client: Client, info: MeshInfo, wanted: number): Promise<Mesh> {
+export async function assemble(client: Client, info: MeshInfo, wanted: number): Promise<Mesh> {
   const { dimension: k, ambientDimension: d } = info;
   const growth = new GrowingComplex(k, d);
   const cells: Uint32Array[] = [];
   const oriented: OrientedPart[] = [];
+  const places = new Places();
   let revision = 0;
   for await (const part of client.parts(info.name, wanted)) {
     revision = part.revision;
@@ -163,6 +165,7 @@ async function assemble(client: Client, info: MeshInfo, wanted: number): Promise
     if (block.length) oriented.push({ count: block.length / (k + 1), told: part.orientation });
     growth.addPoints(part.firstVertex, numbers(part.points, -1, d));
     growth.addWalls(part.boundaryVertices, part.boundaryWalls);
+    if (part.places) places.add(part.places, d);
   }
   const rows = joined(cells);
   const order = sortedOrder(rows, k + 1);
@@ -179,6 +182,8 @@ async function assemble(client: Client, info: MeshInfo, wanted: number): Promise
     last ? info.report : undefined,
     growth.walls(),
     bits && takeBits(bits, order),
+    places.names(growth.points().length / d),
+    places.smoothed(growth.points().length),
   );
 }
 
@@ -251,7 +256,7 @@ export async function* follow(
   if (leaving?.aborted) throw new Cancelled("the mesh is left as it is", { mesh: soFar() });
 }
 
-function judged(mesh: Mesh, { state, report }: MeshInfo): Mesh {
+export function judged(mesh: Mesh, { state, report }: MeshInfo): Mesh {
   if (state === "CANCELLED") throw new Cancelled("the mesh was cancelled", { mesh });
   if (state === "FAILED") {
     const reason = report?.failure?.reason || "ORACLE_FAILED";

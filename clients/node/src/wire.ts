@@ -4,7 +4,7 @@ import { endianness } from "node:os";
 import { dirname, join } from "node:path";
 import { fileURLToPath } from "node:url";
 import * as grpc from "@grpc/grpc-js";
-import { loadSync, type MessageTypeDefinition } from "@grpc/proto-loader";
+import { type EnumTypeDefinition, loadSync, type MessageTypeDefinition } from "@grpc/proto-loader";
 import protobuf from "protobufjs";
 import type { ProtoGrpcType } from "./generated/stellate.js";
 import type { Array as WireArray } from "./generated/stellate/v1/Array.js";
@@ -34,6 +34,14 @@ export const SpecBytes = proto["stellate.v1.MeshSpec"] as MessageTypeDefinition<
   MeshSpec,
   MeshSpec__Output
 >;
+
+const place = (proto["stellate.v1.Place"] as EnumTypeDefinition).type as {
+  value: { number: number; name: string }[];
+};
+/** The names of the protocol's Place, by their numbers. */
+export const PLACES: ReadonlyMap<number, string> = new Map(
+  place.value.map(({ number, name }) => [number, name]),
+);
 
 const details = protobuf.parse(
   readFileSync(join(folder, "stellate/rpc/status_details.proto"), "utf8"),
