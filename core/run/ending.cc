@@ -31,6 +31,20 @@ constexpr double kLikelyError = 1e-3;
 constexpr double kNearlyMeet = 0.25;
 // In radii of a wall's curvature: no mesh with such an epsilon is certified, or likely to end.
 constexpr double kMuchTooCoarse = 2;
+// The least cosine, that of 37 degrees, of the angle from a wall's normal at which a step is taken
+// to go across a layer and not along it.
+constexpr double kAcross = 0.8;
+
+// Puts a cause, its place and what to do first, before what was seen of it: "Not certified: CAUSE.
+// The run ended as ...".
+void Lead(const std::string& cause, std::string* verdict) {
+  const std::size_t mark = verdict->find(": ");
+  const std::size_t at = mark == std::string::npos ? 0 : mark + 2;
+  if (at < verdict->size() && (*verdict)[at] >= 'a' && (*verdict)[at] <= 'z')
+    (*verdict)[at] = static_cast<char>((*verdict)[at] - 'a' + 'A');
+  verdict->insert(at, cause + ". ");
+  if (!verdict->ends_with('.')) *verdict += '.';
+}
 
 }  // namespace
 
@@ -106,7 +120,7 @@ std::string DescribeCrease(const Crease& crease) {
 }
 
 template <int K>
-void ExplainSharpest(const Engine<K>& engine, Certificate* certificate) {
+void ExplainSharpest(const Engine<K>& engine, bool is_stalled, Certificate* certificate) {
   certificate->sharpest = Sharpest<K>(engine.stars());
   const double told_below = certificate->certified ? ThinAngle(K) : SafeAngle(K);
   if (!certificate->sharpest || certificate->sharpest->degrees >= told_below) return;
@@ -120,10 +134,12 @@ void ExplainSharpest(const Engine<K>& engine, Certificate* certificate) {
     certificate->warnings.push_back("W" + where + ": simplices there are as thin.");
     return;
   }
+  const std::string why =
+      Message("w", where, ", and in dimension ", K, " the refinement may not end below ",
+              SafeAngle(K), ": cut that edge off by one wall more, or take a smaller epsilon");
+  if (is_stalled) return Lead(why, &certificate->verdict);
   if (certificate->verdict.ends_with('.')) certificate->verdict.pop_back();
-  certificate->verdict +=
-      Message("; w", where, ", and in dimension ", K, " the refinement may not end below ",
-              SafeAngle(K), ": cut that edge off by one wall more, or take a smaller epsilon.");
+  certificate->verdict += Message("; ", why, ".");
 }
 
 template <int K>
@@ -152,26 +168,55 @@ void ExplainWallCurvature(const Engine<K>& engine, double epsilon,
   const bool is_sharp = bend && epsilon > kCoarse * bend->radius();
   const std::optional<std::uint32_t> lone = is_sharp ? std::nullopt : LoneVertex<K>(stars, longest);
   if (!is_sharp && !lone && !piece) return;
-  if (certificate->verdict.ends_with('.')) certificate->verdict.pop_back();
   if (is_sharp) {
-    certificate->verdict += Message(
-        "; wall ", bend->wall, " bends by ", Brief(bend->degrees),
-        " degrees between vertices that are ", Brief(bend->length), " apart, near ",
-        NamePoint(bend->point),
-        ": if it has a crease there, give its sides as walls of their own, which meet in an edge; "
-        "if it is round, take epsilon at most ",
-        Brief(bend->size_to_take()), ".");
+    Lead(Message("wall ", bend->wall, " bends by ", Brief(bend->degrees),
+                 " degrees between vertices that are ", Brief(bend->length), " apart, near ",
+                 NamePoint(bend->point), ": if it is round, take epsilon at most ",
+                 Brief(bend->size_to_take()),
+                 "; if it has a crease there, give its sides as walls of their own, which meet in "
+                 "an edge"),
+         &certificate->verdict);
     return;
   }
   const PieceOfWall small = lone ? PieceOfWall{std::countr_zero(stars.sample().walls(*lone)),
                                                Eigen::Map<const Eigen::VectorXd>(
                                                    stars.sample().Point(*lone), stars.sample().d())}
                                  : *piece;
-  certificate->verdict +=
-      Message("; wall ", small.wall, " has a piece at ", NamePoint(small.point),
-              " that is too small for epsilon ", Brief(epsilon), ": ",
-              lone ? Message("vertex ", *lone, " finds no neighbour on it") : "no mesh ends there",
-              "; take epsilon at most a fifth of the width of that hole or piece.");
+  Lead(Message("wall ", small.wall, " has a piece at ", NamePoint(small.point),
+               " that is too small for epsilon ", Brief(epsilon), ", where ",
+               lone ? Message("vertex ", *lone, " finds no neighbour on it") : "no mesh ends",
+               ": take epsilon at most a fifth of the width of that hole or piece"),
+       &certificate->verdict);
+}
+
+// Returns the cosine of the angle between a wall's conormal at one of its vertices and a step, 0 if
+// they are orthogonal.
+template <int K>
+double Across(const Stars<K>& stars, std::uint32_t p, int wall, const Eigen::VectorXd& step) {
+  const double* const conormal =
+      stars.sample().Conormals(p) + K * CountWalls(stars.sample().walls(p) & (SetOfWall(wall) - 1));
+  const Eigen::Map<const Eigen::MatrixXd> tangents(stars.sample().Tangent(p), stars.sample().d(),
+                                                   K);
+  const Eigen::Map<const Eigen::Matrix<double, K, 1>> along(conormal);
+  return std::abs(step.dot(tangents * along)) / step.norm();
+}
+
+// Returns the two walls of a thin layer that two corners are on either side of: each corner is on
+// one of them, both on all others, and the step from one to the other is across these.
+template <int K>
+std::optional<std::pair<int, int>> LayerBetween(const Stars<K>& stars, const NearCorners& near) {
+  const WallSet first = stars.sample().walls(near.first),
+                second = stars.sample().walls(near.second);
+  const WallSet one = first & ~second, other = second & ~first;
+  if (CountWalls(one) != 1 || CountWalls(other) != 1) return std::nullopt;
+  const std::pair<int, int> walls(std::countr_zero(one), std::countr_zero(other));
+  using Point = Eigen::Map<const Eigen::VectorXd>;
+  const Eigen::VectorXd step = Point(stars.sample().Point(near.second), stars.sample().d()) -
+                               Point(stars.sample().Point(near.first), stars.sample().d());
+  const bool is_layer = near.distance > 0 &&
+                        Across<K>(stars, near.first, walls.first, step) >= kAcross &&
+                        Across<K>(stars, near.second, walls.second, step) >= kAcross;
+  return is_layer ? std::optional(walls) : std::nullopt;
 }
 
 template <int K>
@@ -180,14 +225,27 @@ void ExplainNearCorners(const Engine<K>& engine, double epsilon, Certificate* ce
   const Stars<K>& stars = engine.stars();
   const std::optional<NearCorners> near = NearestCorners<K>(stars);
   if (!near || near->distance > kNearlyMeet * epsilon) return;
-  if (certificate->verdict.ends_with('.')) certificate->verdict.pop_back();
-  certificate->verdict += Message(
-      "; walls ", ListWalls(stars.sample().walls(near->first) | stars.sample().walls(near->second)),
-      " nearly meet in one point: two corners are ", Brief(near->distance), " apart at ",
-      NamePoint(
-          Eigen::Map<const Eigen::VectorXd>(stars.sample().Point(near->first), stars.sample().d())),
-      ", far less than epsilon ", Brief(epsilon),
-      "; move one of these walls, so that it passes farther away, or take a smaller epsilon.");
+  if (const auto walls = LayerBetween<K>(stars, *near)) {
+    const auto [lower, upper] = std::minmax({walls->first, walls->second});
+    Lead(Message("walls ", lower, " and ", upper, " are ", Brief(near->distance), " apart at ",
+                 NamePoint(Eigen::Map<const Eigen::VectorXd>(stars.sample().Point(near->first),
+                                                             stars.sample().d())),
+                 ", far less than epsilon ", Brief(epsilon),
+                 ": leave out the layer between them, or make it thicker, or take epsilon at most ",
+                 Brief(near->distance / kNearlyMeet)),
+         &certificate->verdict);
+    return;
+  }
+  Lead(
+      Message("walls ",
+              ListWalls(stars.sample().walls(near->first) | stars.sample().walls(near->second)),
+              " nearly meet in one point: two corners are ", Brief(near->distance), " apart at ",
+              NamePoint(Eigen::Map<const Eigen::VectorXd>(stars.sample().Point(near->first),
+                                                          stars.sample().d())),
+              ", far less than epsilon ", Brief(epsilon),
+              "; move one of these walls, so that it passes farther away, or take epsilon at most ",
+              Brief(near->distance / kNearlyMeet)),
+      &certificate->verdict);
 }
 
 std::string WhyTooCrowded(const CrowdedCorner& corner, int k) {
@@ -312,7 +370,7 @@ void WarnOfCompromises(const Engine<K>& engine, double epsilon, Certificate* cer
 #define STELLATE_EACH(K)                                                                  \
   template void DescribeUnfinished<K>(const Engine<K>&, double, bool, Certificate*);      \
   template std::string WhatIsLeft<K>(const Engine<K>&, std::uint64_t);                    \
-  template void ExplainSharpest<K>(const Engine<K>&, Certificate*);                       \
+  template void ExplainSharpest<K>(const Engine<K>&, bool, Certificate*);                 \
   template void ExplainInactiveWall<K>(const Engine<K>&, int, Certificate*);              \
   template bool HasPieceTooSmall<K>(const Engine<K>&, double);                            \
   template void ExplainWallCurvature<K>(const Engine<K>&, double,                         \

@@ -22,9 +22,10 @@ void DescribeUnfinished(const Engine<K>& engine, double epsilon, bool is_smooth,
 std::string DescribeCrease(const Crease& crease);
 
 // Records where walls meet at the smallest angle. If that is below SafeAngle, also adds a sentence,
-// as a warning to a certified mesh, else to the verdict.
+// as a warning to a certified mesh, else to the verdict: first of all, as the likely cause, if the
+// run is stalled.
 template <int K>
-void ExplainSharpest(const Engine<K>& engine, Certificate* certificate);
+void ExplainSharpest(const Engine<K>& engine, bool is_stalled, Certificate* certificate);
 
 // Adds an inactive wall, on which no vertex lies, to the verdict of a mesh that made no progress.
 template <int K>
@@ -40,14 +41,15 @@ struct PieceOfWall {
   Eigen::VectorXd point;
 };
 
-// Adds to the verdict of a finished mesh that is not certified: where a wall bends more than
-// epsilon can follow, or has a piece smaller than that. `piece`: one that the mesh lacked, if any.
+// Puts a cause first in the verdict of a finished mesh that is not certified: where a wall bends
+// more than epsilon can follow, or has a piece smaller than that. `piece`: one that the mesh
+// lacked, if any.
 template <int K>
 void ExplainWallCurvature(const Engine<K>& engine, double epsilon,
                           const std::optional<PieceOfWall>& piece, Certificate* certificate);
 
-// Adds to the verdict of a mesh that is not certified: where walls nearly meet in one point, so
-// that corners are far nearer to each other than epsilon.
+// Puts a cause first in the verdict of a mesh that is not certified: where walls nearly meet in one
+// point, so that corners are far nearer to each other than epsilon.
 template <int K>
 void ExplainNearCorners(const Engine<K>& engine, double epsilon, Certificate* certificate);
 

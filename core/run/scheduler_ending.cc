@@ -87,10 +87,11 @@ void Scheduler<K>::DescribeEnding() {
   if (spec_.walls == 0) return;
   if (termination == Termination::kNoProgress)
     ExplainInactiveWall<K>(engine_, spec_.walls, &certificate);
+  // The one that explains the most leads in the end.
+  ExplainSharpest<K>(engine_, termination == Termination::kNoProgress, &certificate);
   ExplainNearCorners<K>(engine_, spec_.epsilon, &certificate);
   if (termination == Termination::kConverged || termination == Termination::kNoProgress)
     ExplainWallCurvature<K>(engine_, spec_.epsilon, noted_.piece, &certificate);
-  ExplainSharpest<K>(engine_, &certificate);
 }
 
 #define STELLATE_EACH(K)                                   \
