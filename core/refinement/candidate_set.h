@@ -18,6 +18,7 @@ namespace stellate::core {
 struct PlannedPoints {
   Eigen::MatrixXd points;      // d x n
   Eigen::MatrixXd tangents;    // (K rows of d) x n, predicted; or empty
+  Eigen::MatrixXd bends;       // d x n, predicted: from the points to M; or empty
   Eigen::VectorXd spacing;     // n, predicted distance to the nearest; or empty
   std::vector<Rule> rules;     // n, the rule that asks for each; or empty
   std::vector<WallSet> walls;  // n, the face to find each on; or empty: all on M

@@ -17,7 +17,8 @@ constexpr std::size_t kMaxOffsets = 256;  // more would add nothing
 }  // namespace
 
 template <int K>
-void BoundaryDetector::Look(const CandidateSet<K>& candidates, const AnsweredPoints& answers) {
+void BoundaryDetector::Look(const CandidateSet<K>& candidates, const Eigen::MatrixXd& asked,
+                            const AnsweredPoints& answers) {
   const Eigen::Index d = answers.points.rows();
   Eigen::VectorXd step(d);
   for (std::size_t i = 0; i < candidates.targets.size(); ++i) {
@@ -26,7 +27,7 @@ void BoundaryDetector::Look(const CandidateSet<K>& candidates, const AnsweredPoi
     for (Eigen::Index c = candidates.first[i]; c < candidates.first[i + 1]; ++c) {
       if (offsets_.size() >= 2 * static_cast<std::size_t>(d) * kMaxOffsets) return;
       if (!answers.found[static_cast<std::size_t>(c)]) continue;
-      step = candidates.points.col(c) - answers.points.col(c);
+      step = asked.col(c) - answers.points.col(c);
       const double* tangent = answers.tangents.col(c).data();
       double along2 = 0;
       for (int a = 0; a < K; ++a) {
@@ -50,8 +51,9 @@ std::string BoundaryDetector::Describe(int d) const {
                  ": the manifold ends there, or the tangent spaces are wrong");
 }
 
-#define STELLATE_EACH(K) \
-  template void BoundaryDetector::Look<K>(const CandidateSet<K>&, const AnsweredPoints&);
+#define STELLATE_EACH(K)                                                                  \
+  template void BoundaryDetector::Look<K>(const CandidateSet<K>&, const Eigen::MatrixXd&, \
+                                          const AnsweredPoints&);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH
 

@@ -12,10 +12,11 @@ namespace stellate::core {
 // none.
 class BoundaryDetector {
  public:
-  // Collects offsets from the closest points of candidates, with their tangents. REQUIRES: no
-  // alternations.
+  // Collects offsets from the closest points of candidates, with their tangents. `asked`: by
+  // candidate, d x n. REQUIRES: no alternations.
   template <int K>
-  void Look(const CandidateSet<K>& candidates, const AnsweredPoints& answers);
+  void Look(const CandidateSet<K>& candidates, const Eigen::MatrixXd& asked,
+            const AnsweredPoints& answers);
 
   // Points y of M and the components of q - y along M, 2 d each, as KnownOfManifold has them.
   const std::vector<double>& offsets() const { return offsets_; }

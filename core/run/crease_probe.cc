@@ -173,7 +173,7 @@ void CreaseProbe::TakePoints(const AnswerBlock& answer) {
   std::vector<double> steps;
   steps.reserve(found.size());
   for (const Eigen::Index c : found) steps.push_back(kDifference * WalkOf(c).way.length());
-  finder_.Start(found_, std::vector<const double*>(found.size(), nullptr), std::move(steps));
+  finder_.Start({found_, std::vector<const double*>(found.size(), nullptr), std::move(steps)});
   is_difference_ = true;
 }
 

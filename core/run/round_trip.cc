@@ -8,6 +8,16 @@
 #include "core/base/vector_ops.h"
 
 namespace stellate::core {
+namespace {
+
+// Where answers tell tangent spaces, queries lie this share of a simplex's radius, or of the
+// lattice's spacing, beside M: far above what the oracle may be wrong by, and so little that the
+// answer moves by a hundredth, as the normal there is known to a tenth.
+constexpr double kStandOff = 0.1;
+// Points planned so many epsilon apart may have any tangent space.
+constexpr double kFar = 3;
+
+}  // namespace
 
 template <int K>
 RoundTrip<K>::RoundTrip(const Engine<K>& engine, const OracleCapabilities& oracle,
@@ -20,7 +30,61 @@ RoundTrip<K>::RoundTrip(const Engine<K>& engine, const OracleCapabilities& oracl
   const bool alternates = !oracle_.intersect_flat && candidates_.planned.size() == 0 && walls_ == 0;
   if (alternates) alternations_left_ = engine_.criteria().flat_alternations - 1;
   FindKnown();
+  PlanPoints();
   AskForAll();
+}
+
+// Moves queries off M, to the side that it bends away from, where their answers then tell the
+// tangent space, too. On the other side one might be so far from its place that M comes by.
+template <int K>
+void RoundTrip<K>::PlanPoints() {
+  const int d = engine_.stars().sample().d();
+  const PlannedPoints& planned = candidates_.planned;
+  asked_.resize(d, candidates_.size());
+  if (candidates_.drawn() > 0) asked_.leftCols(candidates_.drawn()) = candidates_.points;
+  if (planned.size() > 0) asked_.rightCols(planned.size()) = planned.points;
+  if (oracle_.tangent_basis || !finder_.reads_normals()) return;
+  const Stars<K>& stars = engine_.stars();
+  const std::vector<Target<K>>& targets = candidates_.targets;
+  offsets_.setZero(d, candidates_.size());
+  ParallelFor(targets.size(), [&](std::size_t i) {
+    const Target<K>& t = targets[i];
+    if (candidates_.in_flats[i] || t.is_coarse()) return;
+    const auto& cell = stars.cell(t.star);
+    Eigen::VectorXd bend = Eigen::VectorXd::Zero(d);
+    for (std::size_t f = 0; f < cell.facet_count(); ++f)
+      if (IsSample(cell.id(f)))
+        for (int j = 0; j < d; ++j)
+          bend[j] += stars.sample().Point(cell.id(f))[j] - stars.sample().Point(t.star)[j];
+    for (Eigen::Index c = candidates_.first[i]; c < candidates_.first[i + 1]; ++c)
+      StandOff(c, stars.sample().Tangent(t.star), bend.data(), kStandOff * t.radius);
+  });
+  ParallelFor(static_cast<std::size_t>(planned.size()), [&](std::size_t at) {
+    if (planned.tangents.size() == 0) return;
+    const auto i = static_cast<Eigen::Index>(at);
+    const double spacing =
+        planned.spacing.size() > 0 ? planned.spacing[i] : engine_.criteria().epsilon;
+    StandOff(candidates_.drawn() + i, planned.tangents.col(i).data(),
+             planned.bends.size() > 0 ? planned.bends.col(i).data() : nullptr, kStandOff * spacing);
+  });
+  asked_ += offsets_;
+}
+
+// Sets the offset of a candidate: along a normal of the tangent space, away from where M bends
+// towards.
+template <int K>
+void RoundTrip<K>::StandOff(Eigen::Index candidate, const double* tangent, const double* towards,
+                            double by) {
+  const Eigen::Index d = asked_.rows();
+  const Eigen::Map<const Eigen::MatrixXd> basis(tangent, d, K);
+  const auto across = [&](const Eigen::VectorXd& v) -> Eigen::VectorXd {
+    return v - basis * (basis.transpose() * v);
+  };
+  Eigen::Index axis = 0;
+  basis.rowwise().squaredNorm().minCoeff(&axis);
+  Eigen::VectorXd normal = across(Eigen::VectorXd::Unit(d, axis));
+  if (towards && normal.dot(Eigen::Map<const Eigen::VectorXd>(towards, d)) > 0) normal = -normal;
+  offsets_.col(candidate) = by / normal.norm() * normal;
 }
 
 // Between a vertex of M and a point beyond a wall lies a point of that wall, and the sample covers
@@ -78,7 +142,7 @@ void RoundTrip<K>::AskForAll() {
   for (Eigen::Index i = 0; i < planned.size(); ++i) {
     const int block = block_of.at(faces[static_cast<std::size_t>(i)]);
     const Eigen::Index column = next[static_cast<std::size_t>(block)]++;
-    open_[static_cast<std::size_t>(block)].points.col(column) = planned.points.col(i);
+    open_[static_cast<std::size_t>(block)].points.col(column) = asked_.col(candidates_.drawn() + i);
     places_.emplace_back(block, column);
   }
 }
@@ -142,7 +206,7 @@ void RoundTrip<K>::AskForDrawn() {
       if (IsKnown(c)) continue;
       const auto [b, column] = places_[static_cast<std::size_t>(c)];
       QueryBlock& block = open_[static_cast<std::size_t>(b)];
-      block.points.col(column) = candidates_.points.col(c);
+      block.points.col(column) = asked_.col(c);
       if (!candidates_.in_flats[i]) continue;
       ToByCoordinate(stars.sample().Tangent(targets[i].star), stars.sample().d(), K,
                      block.bases.col(column).data());
@@ -280,6 +344,8 @@ void RoundTrip<K>::AskAgain() {
       }
     }
   }
+  if (offsets_.size() > 0) block.points += offsets_;
+  asked_ = block.points;
   open_.push_back(std::move(block));
   for (Eigen::Index c = 0; c < candidates_.size(); ++c)
     places_[static_cast<std::size_t>(c)] = {0, c};
@@ -289,30 +355,41 @@ void RoundTrip<K>::AskAgain() {
 template <int K>
 void RoundTrip<K>::AskForTangents() {
   std::vector<Eigen::Index> known;
-  std::vector<const double*> guesses;
-  std::vector<double> shares;
+  TangentFinder::Points of;
   const auto add = [&](Eigen::Index c, const double* guess) {
     if (!answers_.found[static_cast<std::size_t>(c)]) return;
     known.push_back(c);
-    guesses.push_back(guess);
+    of.guesses.push_back(guess);
     if (answers_.sizes.size() > 0)
-      shares.push_back(engine_.sizes().BoundFor(answers_.sizes[c]) / engine_.criteria().epsilon);
+      of.shares.push_back(engine_.sizes().BoundFor(answers_.sizes[c]) / engine_.criteria().epsilon);
   };
   for (std::size_t i = 0; i < candidates_.targets.size(); ++i) {
     CheckInterruption(i);
     // Far steps may turn any corner: no guess there.
     const Target<K>& t = candidates_.targets[i];
     const double* guess = t.is_coarse() ? nullptr : engine_.stars().sample().Tangent(t.star);
-    for (Eigen::Index c = candidates_.first[i]; c < candidates_.first[i + 1]; ++c) add(c, guess);
+    for (Eigen::Index c = candidates_.first[i]; c < candidates_.first[i + 1]; ++c) {
+      if (candidates_.in_flats[i]) asked_.col(c) = answers_.points.col(c);  // tells no normal
+      add(c, guess);
+    }
   }
   const PlannedPoints& planned = candidates_.planned;
-  for (Eigen::Index i = 0; i < planned.size(); ++i)
+  for (Eigen::Index i = 0; i < planned.size(); ++i) {
+    const bool is_far = finder_.reads_normals() && planned.spacing.size() > 0 &&
+                        planned.spacing[i] > kFar * engine_.criteria().epsilon;
     add(candidates_.drawn() + i,
-        planned.tangents.size() > 0 ? planned.tangents.col(i).data() : nullptr);
+        planned.tangents.size() > 0 && !is_far ? planned.tangents.col(i).data() : nullptr);
+  }
   if (known.empty()) return;
-  finds_tangents_ = true;
-  finder_.Start(answers_.points(Eigen::all, known), std::move(guesses), std::move(shares));
-  open_.push_back(*finder_.Next());
+  of.points = answers_.points(Eigen::all, known);
+  of.asked = asked_(Eigen::all, known);
+  finder_.Start(std::move(of));
+  if (const QueryBlock* block = finder_.Next()) {
+    finds_tangents_ = true;
+    open_.push_back(*block);
+  } else {
+    TakeTangents();
+  }
 }
 
 template <int K>

@@ -29,6 +29,8 @@ class RoundTrip final : public QuerySource {
   const CandidateSet<K>& candidates() const { return candidates_; }
   // Complete once there are no more questions.
   const AnsweredPoints& answers() const { return answers_; }
+  // The points asked for by candidate, d x n, as far as closest points were.
+  const Eigen::MatrixXd& asked() const { return asked_; }
 
  private:
   QueryBlock NewBlock(QueryKind kind, WallSet face) const;
@@ -39,6 +41,8 @@ class RoundTrip final : public QuerySource {
   }
   void TakeKnown(Eigen::Index candidate);
   WallSet SignsOfKnown(Eigen::Index candidate) const;
+  void PlanPoints();
+  void StandOff(Eigen::Index candidate, const double* tangent, const double* towards, double by);
   void AskForAll();
   void AskForDrawn();
   void Sort(const std::vector<AnswerBlock>& answers);
@@ -52,6 +56,7 @@ class RoundTrip final : public QuerySource {
   const int walls_;
   TangentFinder& finder_;
   CandidateSet<K> candidates_;
+  Eigen::MatrixXd asked_, offsets_;  // by candidate, d x n; offsets from the candidates, or empty
   std::vector<QueryBlock> open_;
   std::vector<WallSet> asked_faces_;                  // by block, of the open questions
   std::vector<std::pair<int, Eigen::Index>> places_;  // by candidate: block and column of open_

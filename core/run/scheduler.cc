@@ -150,7 +150,7 @@ void Scheduler<K>::InsertCandidates() {
     creases_.NoteFrontMoved();
   }
   if (engine_.criteria().flat_alternations == 1 && spec_.walls == 0)
-    watches_.boundary.Look(trip_->candidates(), trip_->answers());
+    watches_.boundary.Look(trip_->candidates(), trip_->asked(), trip_->answers());
   noted_.speculation_failed = inserted.rules.empty();
   spare_points_.Keep(trip_->answers(), inserted.used);
 }

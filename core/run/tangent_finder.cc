@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "core/base/dense.h"
 #include "core/base/parallel.h"
@@ -20,27 +21,116 @@ constexpr double kLeastRatio = 1e-3;
 // The derivative has rank k: further singular values are curvature times step, or noise.
 constexpr double kMostBeyond = 0.3;
 
+// A normal is read off an answer that is at least `step` away: the oracle's error turns it no more
+// than it turns differences. It is compared with them from so many steps on, where it is the more
+// exact one of the two.
+constexpr double kTellingSteps = 10;
+// They agree if their angle is no larger than directions may be wrong by without harm (its sine).
+constexpr double kAgree = 0.03;
+// So many have to agree, in places that the seed chose, before one is read unseen; some more are
+// taken, since some may fail.
+constexpr std::uint64_t kComparisons = 24;
+constexpr std::ptrdiff_t kTaken = 32;
+// A normal that is turned farther from its guess (its sine) is not read: on meshes that are fine
+// enough for a certificate few are, and on a crease or an undeclared boundary most.
+constexpr double kMostTurned = 0.3;
+
+// Returns an orthonormal basis of what is orthogonal to `normal`, d x k, k = d - 1: one near to the
+// guess, if there is one.
+Eigen::MatrixXd BasisAcross(Eigen::VectorXd normal, const double* guess) {
+  const Eigen::Index d = normal.size();
+  normal /= normal.norm();
+  if (guess == nullptr) return OrthonormalBasis(normal, d).rightCols(d - 1);
+  const Eigen::Map<const Eigen::MatrixXd> near(guess, d, d - 1);
+  return OrthonormalBasis(near - normal * (normal.transpose() * near), d - 1);
+}
+
 }  // namespace
 
 TangentFinder::TangentFinder(int k, int d, double step, std::uint64_t seed, double most_error)
     : k_(k), d_(d), step_(step), most_error_(most_error), seed_(seed) {}
 
-void TangentFinder::Start(const Eigen::MatrixXd& points, std::vector<const double*> guesses,
-                          std::vector<double> shares) {
-  points_ = points;
-  guesses_ = std::move(guesses);
-  shares_ = std::move(shares);
-  tangents_ = Eigen::MatrixXd::Zero(k_ * d_, points.cols());
-  ok_.assign(static_cast<std::size_t>(points.cols()), 0);
-  errors_.assign(static_cast<std::size_t>(points.cols()), 0);
-  again_ = false;
-  open_.clear();
-  guessed_ = true;
-  for (Eigen::Index i = 0; i < points.cols(); ++i) {
-    open_.push_back(i);
-    guessed_ = guessed_ && guesses_[static_cast<std::size_t>(i)] != nullptr;
+bool TangentFinder::trusts_normals() const { return reads_normals() && agreed_ >= kComparisons; }
+
+void TangentFinder::Start(Points points) {
+  of_ = std::move(points);
+  const Eigen::Index count = of_.points.cols();
+  tangents_ = Eigen::MatrixXd::Zero(k_ * d_, count);
+  ok_.assign(static_cast<std::size_t>(count), 0);
+  errors_.assign(static_cast<std::size_t>(count), 0);
+  waiting_.clear();
+  std::vector<Eigen::Index> open, readable;
+  for (Eigen::Index i = 0; i < count; ++i) (CanRead(i) ? readable : open).push_back(i);
+  if (trusts_normals()) {
+    Read(readable);
+    return Begin(std::move(open));
   }
-  Ask();
+  std::ptrdiff_t taken = 0;
+  for (const Eigen::Index i : readable) {
+    const bool takes = taken < kTaken && Length(i) >= kTellingSteps * StepAt(i);
+    taken += takes;
+    (takes ? open : waiting_).push_back(i);
+  }
+  if (agreed_ + static_cast<std::uint64_t>(taken) < kComparisons)
+    for (const Eigen::Index i : std::exchange(waiting_, {})) open.push_back(i);
+  std::sort(open.begin(), open.end());
+  Begin(std::move(open));
+}
+
+void TangentFinder::Begin(std::vector<Eigen::Index> open) {
+  again_ = false;
+  guessed_ = std::all_of(open.begin(), open.end(), [&](Eigen::Index i) {
+    return of_.guesses[static_cast<std::size_t>(i)] != nullptr;
+  });
+  batch_ = open;
+  open_ = std::move(open);
+  if (!open_.empty()) Ask();
+}
+
+// Whether an answer is far enough from its query, and not turned too far from its guess.
+bool TangentFinder::CanRead(Eigen::Index point) const {
+  if (!reads_normals() || of_.asked.cols() == 0) return false;
+  const double* const guess = of_.guesses[static_cast<std::size_t>(point)];
+  const Eigen::VectorXd normal = of_.asked.col(point) - of_.points.col(point);
+  const double length = normal.norm();
+  if (!(length >= StepAt(point))) return false;
+  if (guess == nullptr) return true;
+  const Eigen::Map<const Eigen::MatrixXd> basis(guess, d_, k_);
+  return (basis.transpose() * normal).norm() <= kMostTurned * length;
+}
+
+void TangentFinder::Read(const std::vector<Eigen::Index>& points) {
+  ParallelFor(points.size(), [&](std::size_t i) {
+    const Eigen::Index point = points[i];
+    Eigen::Map<Eigen::MatrixXd>(tangents_.col(point).data(), d_, k_) = BasisAcross(
+        of_.asked.col(point) - of_.points.col(point), of_.guesses[static_cast<std::size_t>(point)]);
+    ok_[static_cast<std::size_t>(point)] = 1;
+  });
+}
+
+// Compares normals with the differences that were taken.
+void TangentFinder::Compare() {
+  if (!reads_normals() || of_.asked.cols() == 0) return;
+  for (const Eigen::Index point : batch_) {
+    if (!ok_[static_cast<std::size_t>(point)]) continue;
+    const Eigen::VectorXd normal = of_.asked.col(point) - of_.points.col(point);
+    const double length = normal.norm();
+    if (!(length >= kTellingSteps * StepAt(point))) continue;
+    const Eigen::Map<const Eigen::MatrixXd> basis(tangents_.col(point).data(), d_, k_);
+    if ((basis.transpose() * normal).norm() <= kAgree * length)
+      ++agreed_;
+    else
+      has_disagreed_ = true;
+  }
+}
+
+// Differences of a batch have been taken.
+void TangentFinder::GoOn() {
+  Compare();
+  std::vector<Eigen::Index> rest = std::exchange(waiting_, {});
+  if (!trusts_normals()) return Begin(std::move(rest));
+  Read(rest);
+  Begin({});
 }
 
 void TangentFinder::Ask() {
@@ -56,14 +146,14 @@ void TangentFinder::Ask() {
     for (int j = 0; j < m; ++j) {
       auto u = directions_.col(i * m + j);
       if (guessed_) {
-        const double* guess = guesses_[static_cast<std::size_t>(point)] + j * d_;
+        const double* guess = of_.guesses[static_cast<std::size_t>(point)] + j * d_;
         u = Eigen::Map<const Eigen::VectorXd>(guess, d_);
       } else {
         for (int a = 0; a < d_; ++a) u[a] = random.NearlyNormal();
         u.normalize();
       }
-      block_.points.col((i * m + j) * 2) = points_.col(point) + StepAt(point) * u;
-      block_.points.col((i * m + j) * 2 + 1) = points_.col(point) - StepAt(point) * u;
+      block_.points.col((i * m + j) * 2) = of_.points.col(point) + StepAt(point) * u;
+      block_.points.col((i * m + j) * 2 + 1) = of_.points.col(point) - StepAt(point) * u;
     }
   }
 }
@@ -106,15 +196,17 @@ void TangentFinder::AskMore() {
   }
   if (open.empty() && !again_) {
     again_ = guessed_ = true;
-    for (Eigen::Index point = 0; point < points_.cols(); ++point) {
+    for (const Eigen::Index point : batch_) {
       if (!(errors_[static_cast<std::size_t>(point)] > most_error_)) continue;
-      guesses_[static_cast<std::size_t>(point)] = tangents_.col(point).data();
+      of_.guesses[static_cast<std::size_t>(point)] = tangents_.col(point).data();
       open.push_back(point);
     }
   }
   open_ = std::move(open);
   if (!open_.empty()) return Ask();
-  for (const double error : errors_) error_length_ = std::max(error_length_, error);
+  for (const Eigen::Index point : batch_)
+    error_length_ = std::max(error_length_, errors_[static_cast<std::size_t>(point)]);
+  GoOn();
 }
 
 }  // namespace stellate::core

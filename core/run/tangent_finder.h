@@ -3,20 +3,27 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <limits>
+#include <utility>
 #include <vector>
 
 #include "core/batch.h"
 
 namespace stellate::core {
 
-// Finds tangent spaces for oracles that do not give them (Sec. 5.3.1). The derivative of the
-// closest-point map at y on M is the projection on T_yM, so that differences of closest points
-// along a few directions span it. With a guess (the tangent basis of a nearby sample point) k
-// directions are enough, else k + 4 random ones, for any d: 2k closest points a vertex.
+// Finds tangent spaces for oracles that do not give them (Sec. 5.3.1).
 //
-//   finder.Start(points, guesses);
+// In codimension 1 the answer y to a query x tells: x - y is normal to M there. Otherwise, the
+// derivative of the closest-point map at y is the projection on T_yM, so that differences of
+// closest points along a few directions span it. With a guess (the tangent basis of a nearby sample
+// point) k directions are enough, else k + 4 random ones, for any d: 2k closest points a vertex.
+//
+//   finder.Start({points, guesses, {}, asked});
 //   while (const QueryBlock* block = finder.Next()) finder.Absorb(answers to *block);
 //   finder.tangents();
+//
+// Normals are read only after differences have agreed with them, and never again once one has not:
+// closest points of an oracle that is not exact, and those on a crease or where M ends, do not lie
+// straight below what was asked.
 class TangentFinder {
  public:
   // step: the length of the differences. most_error: the largest error_length of a point. A point
@@ -24,11 +31,19 @@ class TangentFinder {
   TangentFinder(int k, int d, double step, std::uint64_t seed,
                 double most_error = std::numeric_limits<double>::infinity());
 
-  // Starts with points y on M, d x n. guesses: one for each point, K rows of d (as Sample::Tangent)
-  // or nullptr. shares: of `step` to use for each point, smaller where M is known to bend more, or
-  // empty.
-  void Start(const Eigen::MatrixXd& points, std::vector<const double*> guesses,
-             std::vector<double> shares = {});
+  struct Points {
+    Eigen::MatrixXd points;  // on M, d x n
+    // One for each point, K rows of d (as Sample::Tangent) or nullptr.
+    std::vector<const double*> guesses;
+    // Of `step` to use for each point, smaller where M is known to bend more; or empty.
+    std::vector<double> shares{};
+    // The queries with these closest points, d x n; a point itself where there was none; or empty.
+    Eigen::MatrixXd asked{};
+  };
+  void Start(Points points);
+  // Whether queries should be asked beside M rather than on it: their answers then tell the tangent
+  // spaces, too.
+  bool reads_normals() const { return d_ == k_ + 1 && !has_disagreed_; }
 
   // Returns the closest-point queries still needed, or nullptr once tangents() is complete.
   const QueryBlock* Next() const { return open_.empty() ? nullptr : &block_; }
@@ -47,24 +62,39 @@ class TangentFinder {
   double error_length() const { return error_length_; }
 
  private:
+  void Begin(std::vector<Eigen::Index> open);
   void Ask();
   void AskMore();
+  bool CanRead(Eigen::Index point) const;
+  void Read(const std::vector<Eigen::Index>& points);
+  void Compare();
+  void GoOn();
   double StepAt(Eigen::Index point) const {
-    return shares_.empty() ? step_ : shares_[static_cast<std::size_t>(point)] * step_;
+    return of_.shares.empty() ? step_ : of_.shares[static_cast<std::size_t>(point)] * step_;
   }
+  // From its query to a point.
+  double Length(Eigen::Index point) const {
+    return (of_.asked.col(point) - of_.points.col(point)).norm();
+  }
+  bool trusts_normals() const;
 
   int k_, d_;
   double step_, most_error_;
   double error_length_ = 0;
-  std::vector<double> errors_;  // by point, length
-  bool again_ = false;          // the open points have tangents already
   std::uint64_t seed_;
-  bool guessed_ = false;  // the open queries lie along guesses
-  Eigen::MatrixXd points_, tangents_, directions_;
-  std::vector<const double*> guesses_;
-  std::vector<double> shares_;
+  // Comparisons of normals with differences.
+  std::uint64_t agreed_ = 0;
+  bool has_disagreed_ = false;
+
+  Points of_;
+  Eigen::MatrixXd tangents_, directions_;
   std::vector<std::uint8_t> ok_;
-  std::vector<Eigen::Index> open_;  // points whose tangents are not found yet
+  std::vector<double> errors_;         // by point, length
+  std::vector<Eigen::Index> batch_;    // points whose differences are taken now
+  std::vector<Eigen::Index> open_;     // those that queries are open for
+  std::vector<Eigen::Index> waiting_;  // for the comparison of some normals
+  bool again_ = false;                 // the open points have tangents already
+  bool guessed_ = false;               // the open queries lie along guesses
   QueryBlock block_;
 };
 

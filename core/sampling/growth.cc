@@ -54,16 +54,18 @@ template <int K>
 void Growth<K>::Sites::Append(const Sites& others) {
   points.insert(points.end(), others.points.begin(), others.points.end());
   frames.insert(frames.end(), others.frames.begin(), others.frames.end());
+  changes.insert(changes.end(), others.changes.begin(), others.changes.end());
   shares.insert(shares.end(), others.shares.begin(), others.shares.end());
   patch.insert(patch.end(), others.patch.begin(), others.patch.end());
   name.insert(name.end(), others.name.begin(), others.name.end());
 }
 
 template <int K>
-Growth<K>::Proposed::Proposed(std::size_t count, std::size_t stride)
+Growth<K>::Proposed::Proposed(std::size_t count, std::size_t stride, bool predicts)
     : parents(count), clear(count) {
   sites.points.resize(count * stride);
   sites.frames.resize(count * stride * K);
+  if (predicts) sites.changes.resize(count * stride * (K + 1));
   sites.shares.resize(count);
   sites.patch.resize(count);
   sites.name.resize(count);
@@ -75,9 +77,10 @@ Growth<K>::Layer::Layer(int d, std::vector<double> placed, std::vector<double> i
     : points(std::move(placed)), shares(std::move(its_shares)), tree(points, d, reach, shares) {}
 
 template <int K>
-Growth<K>::Growth(int d, double spacing)
+Growth<K>::Growth(int d, double spacing, bool predicts)
     : d_(d),
       spacing_(spacing),
+      predicts_(predicts),
       vectors_(LatticeVectors(K)),
       longest_(spacing * LongestLatticeVector(K)) {
   for (double& x : vectors_) x *= spacing;
@@ -199,6 +202,8 @@ typename Growth<K>::Sites Growth<K>::SitesOf(const Proposed& proposed,
     const double* const frame = proposed.sites.frames.data() + c * stride() * K;
     sites.points.insert(sites.points.end(), point, point + stride());
     sites.frames.insert(sites.frames.end(), frame, frame + stride() * K);
+    const double* const change = proposed.sites.changes.data() + c * change_stride();
+    sites.changes.insert(sites.changes.end(), change, change + change_stride());
     sites.shares.push_back(proposed.sites.shares[c]);
     sites.patch.push_back(proposed.sites.patch[c]);
     sites.name.push_back(proposed.sites.name[c]);
@@ -213,8 +218,26 @@ typename Growth<K>::Ring Growth<K>::Propose() {
   asked_ = is_lost ? Proposed() : Merge(ByPlace(FreePlaces()));
   border_ = {};
   const auto count = static_cast<Eigen::Index>(asked_.sites.size());
-  return {Eigen::Map<const Eigen::MatrixXd>(asked_.sites.points.data(), d_, count),
-          Eigen::Map<const Eigen::MatrixXd>(asked_.sites.frames.data(), d_ * K, count)};
+  Ring ring{Eigen::Map<const Eigen::MatrixXd>(asked_.sites.points.data(), d_, count),
+            Eigen::Map<const Eigen::MatrixXd>(asked_.sites.frames.data(), d_ * K, count),
+            {}};
+  if (!predicts_) return ring;
+  const Eigen::Map<const Eigen::MatrixXd> changes(asked_.sites.changes.data(), d_ * (K + 1), count);
+  ring.bends = changes.topRows(d_);
+  ring.tangents += changes.bottomRows(d_ * K);
+  ring.spacing = spacing_ * Eigen::Map<const Eigen::VectorXd>(asked_.sites.shares.data(), count);
+  return ring;
+}
+
+// Writes how the answer to a proposal, and the frame there, differ from what was proposed.
+template <int K>
+void Growth<K>::NoteChange(std::size_t asked, const double* point, const double* frame) {
+  double* const change = asked_.sites.changes.data() + asked * change_stride();
+  const double* const proposed = asked_.sites.points.data() + asked * stride();
+  const double* const proposed_frame = asked_.sites.frames.data() + asked * stride() * K;
+  for (std::size_t j = 0; j < stride(); ++j) change[j] = point[j] - proposed[j];
+  for (std::size_t j = 0; j < stride() * K; ++j)
+    change[stride() + j] = frame[j] - proposed_frame[j];
 }
 
 // Keeps the share of the answer to query `asked`, if it is about as expected.
@@ -282,6 +305,7 @@ std::vector<Eigen::Index> Growth<K>::Begin(const Eigen::MatrixXd& points,
     tree.Insert(0);
     const auto frame = tangents.col(columns[i]);
     seeds.frames.insert(seeds.frames.end(), frame.begin(), frame.end());
+    seeds.changes.resize(seeds.changes.size() + change_stride());
     seeds.shares.push_back(own[i]);
     seeds.patch.push_back(patches_++);
     seeds.name.push_back(names_.origin());
@@ -302,8 +326,14 @@ std::vector<Eigen::Index> Growth<K>::Join(const Eigen::MatrixXd& points,
     const auto c = static_cast<Eigen::Index>(i);
     const double* const proposed = asked_.sites.points.data() + i * stride();
     const double farthest = asked_.sites.shares[i] * (kFarthestAnswer * spacing_);
-    fits[i] = found[i] && Distance(points.col(c).data(), proposed, d_) <= farthest &&
-              Align<K>(tangents.col(c).data(), d_, frames + i * stride() * K);
+    double* const frame = frames + i * stride() * K;
+    if (!found[i] || Distance(points.col(c).data(), proposed, d_) > farthest) return;
+    thread_local std::vector<double> aligned;
+    aligned.assign(frame, frame + stride() * K);
+    fits[i] = Align<K>(tangents.col(c).data(), d_, aligned.data());
+    if (!fits[i]) return;
+    if (predicts_) NoteChange(i, points.col(c).data(), aligned.data());
+    std::copy(aligned.begin(), aligned.end(), frame);
   });
   std::vector<std::uint32_t> columns;
   std::vector<double> candidates, own;

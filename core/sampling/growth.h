@@ -30,7 +30,8 @@ class Growth {
  public:
   // d        ambient dimension
   // spacing  nearest-neighbour distance of the lattice, length; the largest where it is graded
-  Growth(int d, double spacing);
+  // predicts whether rings say how far M is expected to have bent away from them
+  Growth(int d, double spacing, bool predicts = false);
 
   // Makes seeds of those points of M, d x n with tangent bases (K rows of d) x n, that are found,
   // farther than `clearance` lattice spacings from all points so far, and `apart` spacings (times
@@ -41,9 +42,13 @@ class Growth {
                                   const Eigen::VectorXd& shares = {}, double clearance = 1);
 
   // The next sites of the lattice: points near M, d x n, with roughly orthonormal tangent bases, (K
-  // rows of d) x n.
+  // rows of d) x n. Where it predicts, M is expected to bend there as it did at the points before:
+  // `bends` leads from the points to M, d x n, zero in the first ring, and the tangent bases are
+  // turned alike.
   struct Ring {
     Eigen::MatrixXd points, tangents;
+    Eigen::MatrixXd bends;      // or empty
+    Eigen::VectorXd spacing{};  // n, of the lattice there, length
   };
   Ring Propose();
 
@@ -71,8 +76,10 @@ class Growth {
  private:
   // Places of the lattice: points that joined, or that are proposed.
   struct Sites {
-    std::vector<double> points;        // d each
-    std::vector<double> frames;        // K rows of d each: the lattice's directions
+    std::vector<double> points;  // d each
+    std::vector<double> frames;  // K rows of d each: the lattice's directions
+    // From where it was proposed to where it is, d, and so its frame, K rows of d; or empty.
+    std::vector<double> changes;
     std::vector<double> shares;        // of the spacing
     std::vector<std::uint32_t> patch;  // the seed that it came from
     std::vector<std::uint64_t> name;   // in the lattice of its patch
@@ -81,7 +88,7 @@ class Growth {
   };
   // The means of proposals for one site.
   struct Proposed {
-    explicit Proposed(std::size_t count = 0, std::size_t stride = 0);
+    explicit Proposed(std::size_t count = 0, std::size_t stride = 0, bool predicts = false);
     Sites sites;
     std::vector<std::uint16_t> parents;  // how many proposed it
     std::vector<double> clear;           // no point is nearer than this, length
@@ -102,6 +109,7 @@ class Growth {
   };
 
   std::size_t stride() const { return static_cast<std::size_t>(d_); }
+  std::size_t change_stride() const { return predicts_ ? stride() * (K + 1) : 0; }
   Runs RunsOf(const std::vector<double>& points, const std::vector<double>& shares) const;
   // The points of the sample around a run.
   struct Placed {
@@ -124,11 +132,13 @@ class Growth {
                                     const std::vector<double>& shares, const Proposed& proposed,
                                     const std::vector<std::uint32_t>& columns) const;
   Sites SitesOf(const Proposed& proposed, const std::vector<std::uint32_t>& columns) const;
+  void NoteChange(std::size_t asked, const double* point, const double* frame);
   bool IsExpected(std::size_t asked, double share);
   void Carry(Sites sites);
 
   int d_;
   double spacing_;
+  bool predicts_;
   std::vector<double> vectors_;  // of the lattice, length, K each
   double longest_;               // of them
   LatticeNames names_{K};

@@ -164,7 +164,7 @@ typename Growth<K>::Proposed Growth<K>::ByPlace(std::vector<Proposal> proposals)
             kMerged * spacing_ * std::min(own.share, first.share))
       begins.push_back(i);
   }
-  Proposed places(begins.size(), stride());
+  Proposed places(begins.size(), stride(), predicts_);
   begins.push_back(proposals.size());
   ParallelFor(places.sites.size(), [&](std::size_t place) {
     const std::size_t begin = begins[place], end = begins[place + 1];
@@ -175,6 +175,9 @@ typename Growth<K>::Proposed Growth<K>::ByPlace(std::vector<Proposal> proposals)
       const double* const other = border_.frames.data() + proposals[i].parent * stride() * K;
       for (std::size_t j = 0; j < stride(); ++j) point[j] += share * landed[i * stride() + j];
       for (std::size_t j = 0; j < stride() * K; ++j) frame[j] += share * other[j];
+      const double* const change = border_.changes.data() + proposals[i].parent * change_stride();
+      for (std::size_t j = 0; j < change_stride(); ++j)
+        places.sites.changes[place * change_stride() + j] += share * change[j];
       places.sites.shares[place] += share * proposals[i].share;
     }
     for (std::size_t i = begin; i < end; ++i)
@@ -218,7 +221,7 @@ typename Growth<K>::Proposed Growth<K>::Merge(Proposed places) const {
     if (leads[i]) leaders.push_back(i);
   }
   if (leaders.size() == sites.size()) return places;
-  Proposed merged(leaders.size(), stride());
+  Proposed merged(leaders.size(), stride(), predicts_);
   ParallelFor(leaders.size(), [&](std::size_t l) {
     const std::uint32_t lead = leaders[l];
     const auto is_of = [&](std::uint32_t i) {
@@ -234,6 +237,9 @@ typename Growth<K>::Proposed Growth<K>::Merge(Proposed places) const {
       const double* const other = sites.frames.data() + i * stride() * K;
       for (std::size_t j = 0; j < stride(); ++j) point[j] += weight * from[j];
       for (std::size_t j = 0; j < stride() * K; ++j) frame[j] += weight * other[j];
+      const double* const change = sites.changes.data() + i * change_stride();
+      for (std::size_t j = 0; j < change_stride(); ++j)
+        merged.sites.changes[l * change_stride() + j] += weight * change[j];
       merged.sites.shares[l] += weight * sites.shares[i];
       merged.parents[l] += places.parents[i];
     };

@@ -34,9 +34,10 @@ RingSampler<K>::RingSampler(Engine<K>& engine, const Specification& spec, double
     : engine_(engine),
       are_drawn_(spec.seeds.cols() == 0),
       apart_(apart),
-      growth_(engine.stars().sample().d(), SampleSpacing(K, engine.criteria().epsilon)),
-      scouting_(
-          std::make_unique<Growth<K>>(engine.stars().sample().d(), apart_ * growth_.spacing())) {
+      growth_(engine.stars().sample().d(), SampleSpacing(K, engine.criteria().epsilon),
+              !spec.oracle.tangent_basis),
+      scouting_(std::make_unique<Growth<K>>(engine.stars().sample().d(), apart_ * growth_.spacing(),
+                                            !spec.oracle.tangent_basis)) {
   if (spec.walls > 0) clearance_.emplace(engine, growth_.spacing());
 }
 
@@ -111,6 +112,8 @@ CandidateSet<K> RingSampler<K>::Next(std::uint64_t) {
     if (std::ssize(asked_) == proposed_) {
       candidates.planned.points = std::move(ring.points);
       candidates.planned.tangents = std::move(ring.tangents);
+      candidates.planned.bends = std::move(ring.bends);
+      candidates.planned.spacing = std::move(ring.spacing);
     } else {
       candidates.planned.points = ring.points(Eigen::all, asked_);
       candidates.planned.tangents = ring.tangents(Eigen::all, asked_);

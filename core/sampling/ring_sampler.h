@@ -17,7 +17,8 @@ namespace stellate::core {
 template <int K>
 class RingSampler final : public Sampler<K> {
  public:
-  // The engine must outlive the sampler. Uses of `spec` only its walls and whether it has seeds.
+  // The engine must outlive the sampler. Uses of `spec` only its walls, its oracle's
+  // capabilities and whether it has seeds.
   // apart: the distance between patches, in spacings of the lattice.
   RingSampler(Engine<K>& engine, const Specification& spec, double apart = kPatchesApart);
 

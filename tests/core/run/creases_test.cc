@@ -200,7 +200,7 @@ class Creases : public ::testing::TestWithParam<std::tuple<Shape, bool>> {};
 TEST_P(Creases, EndTheRunSoonWithTheirPlace) {
   const auto& [shape, tangents] = GetParam();
   for (const double epsilon : {0.2, 0.1})
-    for (const std::uint64_t seed : {1, 2}) {
+    for (const std::uint64_t seed : {2, 3}) {
       SCOPED_TRACE(::testing::Message() << "epsilon " << epsilon << ", seed " << seed);
       const DrivenRun run = MeshOf(shape, SpecOf(shape, epsilon, tangents, seed));
       const Certificate& certificate = run.report().certificate;

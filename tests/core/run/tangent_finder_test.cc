@@ -92,7 +92,7 @@ class TangentFinderTest : public ::testing::TestWithParam<std::string> {
     std::vector<const double*> pointers;
     for (std::uint32_t i = 0; i < kPoints; ++i) guesses_.push_back(Turned(i, angle));
     for (const auto& g : guesses_) pointers.push_back(g.data());
-    finder_.Start(points_, pointers);
+    finder_.Start({points_, pointers});
   }
 
   std::unique_ptr<Manifold> manifold_;
@@ -104,7 +104,7 @@ class TangentFinderTest : public ::testing::TestWithParam<std::string> {
 };
 
 TEST_P(TangentFinderTest, FindsTangentsFromNothing) {
-  finder_.Start(points_, std::vector<const double*>(kPoints, nullptr));
+  finder_.Start({points_, std::vector<const double*>(kPoints, nullptr)});
   const Eigen::Index asked = Finish();
   ExpectAllFound();
   EXPECT_EQ(asked, kPoints * 2 * std::min(k_ + 4, d_));  // however large d is
@@ -129,13 +129,13 @@ TEST_P(TangentFinderTest, RecoversFromGuessesThatAreFarOff) {
 TEST_P(TangentFinderTest, BoundsWhatItMayBeWrongBy) {
   const double reach = manifold_->facts().reach.value_or(0);
   if (reach == 0) return SUCCEED();
-  finder_.Start(points_, std::vector<const double*>(kPoints, nullptr));
+  finder_.Start({points_, std::vector<const double*>(kPoints, nullptr)});
   Finish();
   const double poor = finder_.error_length();
   for (std::uint32_t i = 0; i < kPoints; ++i) EXPECT_LE(Error(i), poor / reach) << "point " << i;
   const double most = 3 * kStep * std::sqrt(k_);
   finder_ = TangentFinder(k_, d_, kStep, 1, most);
-  finder_.Start(points_, std::vector<const double*>(kPoints, nullptr));
+  finder_.Start({points_, std::vector<const double*>(kPoints, nullptr)});
   Finish();
   ExpectAllFound();
   EXPECT_LE(finder_.error_length(), most);
@@ -145,7 +145,7 @@ TEST_P(TangentFinderTest, BoundsWhatItMayBeWrongBy) {
 }
 
 TEST_P(TangentFinderTest, SaysWhereAnswersWereMissing) {
-  finder_.Start(points_, std::vector<const double*>(kPoints, nullptr));
+  finder_.Start({points_, std::vector<const double*>(kPoints, nullptr)});
   const Eigen::Index each = 2 * std::min(k_ + 4, d_);
   Finish([&](Eigen::Index query) { return query / each % 3 == 0 && query % each == 1; });
   for (std::uint32_t i = 0; i < kPoints; ++i) {
@@ -165,12 +165,12 @@ TEST_P(TangentFinderTest, TriesAgainWithoutAGuessWhereAnswersWereMissing) {
 
 TEST_P(TangentFinderTest, IsDeterministicAndCanStartAgain) {
   const std::vector<const double*> none(kPoints, nullptr);
-  finder_.Start(points_, none);
+  finder_.Start({points_, none});
   Finish();
   const Eigen::MatrixXd first = finder_.tangents();
   StartWithGuesses(0.3);
   Finish();
-  finder_.Start(points_, none);
+  finder_.Start({points_, none});
   Finish();
   EXPECT_EQ(finder_.tangents(), first);
 }
@@ -178,13 +178,130 @@ TEST_P(TangentFinderTest, IsDeterministicAndCanStartAgain) {
 INSTANTIATE_TEST_SUITE_P(Catalogue, TangentFinderTest,
                          ::testing::Values("torus", "so3", "sphere:2:50", "rp2", "circle:10"));
 
+// Normals read off answers, in codimension 1.
+class NormalsTest : public ::testing::Test {
+ protected:
+  static constexpr Eigen::Index kAsked = 400;
+
+  // Random points a little off the torus, and what `answer` makes of them.
+  template <typename Answer>
+  Eigen::Index Find(Answer&& answer, std::uint64_t seed) {
+    Random random(seed, 5);
+    TangentFinder::Points of;
+    of.points = RandomPointsOn(*torus_, kAsked, seed);
+    of.asked = of.points;
+    for (double& x : of.asked.reshaped()) x += 0.05 * random.NearlyNormal();
+    of.points = answer(of.asked);
+    of.guesses.resize(kAsked, nullptr);
+    points_ = of.points;
+    finder_.Start(std::move(of));
+    Eigen::Index asked = 0;
+    while (const QueryBlock* block = finder_.Next()) {
+      asked += block->size();
+      AnswerBlock answers;
+      answers.points = answer(block->points);
+      finder_.Absorb(answers);
+    }
+    return asked;
+  }
+  double WorstError() const {
+    const Eigen::MatrixXd bases = torus_->TangentBasis(points_);
+    double worst = 0;
+    for (Eigen::Index i = 0; i < kAsked; ++i) {
+      const Eigen::Map<const Eigen::MatrixXd> found(finder_.tangents().col(i).data(), 3, 2);
+      Eigen::MatrixXd exact(3, 2);
+      for (int j = 0; j < 6; ++j) exact(j / 2, j % 2) = bases(j, i);
+      worst = std::max(worst, (found - exact * (exact.transpose() * found)).operatorNorm());
+      EXPECT_LT((found.transpose() * found - Eigen::Matrix2d::Identity()).norm(), 1e-12);
+    }
+    return worst;
+  }
+  Eigen::MatrixXd Closest(const Eigen::MatrixXd& x) { return torus_->ClosestPoint(x).points; }
+
+  std::unique_ptr<Manifold> torus_ = Make("torus");
+  TangentFinder finder_{2, 3, kStep, 1};
+  Eigen::MatrixXd points_;
+};
+
+TEST_F(NormalsTest, CostNothingOnceSomeHaveAgreedWithDifferences) {
+  const auto exact = [&](const Eigen::MatrixXd& x) { return Closest(x); };
+  EXPECT_LE(Find(exact, 1), 6 * 72);  // some lie too near to their queries
+  EXPECT_LT(WorstError(), 1e-3);
+  EXPECT_LE(Find(exact, 2), 6 * 40);
+  EXPECT_LT(WorstError(), 1e-3);
+}
+
+TEST_F(NormalsTest, MayBeWrongByWhatTheAnswersAreOverTheirLength) {
+  std::uint64_t count = 0;
+  const auto inexact = [&](const Eigen::MatrixXd& x) {
+    Eigen::MatrixXd y = Closest(x);
+    Random random(++count, 3);
+    for (double& c : y.reshaped()) c += 1e-6 * (2 * random.Uniform() - 1);
+    return y;
+  };
+  EXPECT_LE(Find(inexact, 1), 6 * 72);
+  EXPECT_LT(WorstError(), 4 * 5e-6 / kStep);
+  const auto single = [&](const Eigen::MatrixXd& x) -> Eigen::MatrixXd {
+    return Closest(x.cast<float>().cast<double>()).cast<float>().cast<double>();
+  };
+  EXPECT_LE(Find(single, 2), 6 * 40);
+  EXPECT_LT(WorstError(), 1e-3);
+}
+
+// Answers that do not lie straight below what was asked: a step along M is added, which grows with
+// the distance.
+TEST_F(NormalsTest, AreNotReadOffAnswersThatLieAside) {
+  const auto aside = [&](const Eigen::MatrixXd& x) {
+    const Eigen::MatrixXd y = Closest(x);
+    return Closest(y + 0.2 * (x - y).colwise().norm().replicate(3, 1).cwiseProduct(
+                                 Eigen::Vector3d(0.3, 0.5, 0.8).replicate(1, x.cols())));
+  };
+  EXPECT_EQ(Find(aside, 1), 6 * kAsked);
+  EXPECT_FALSE(finder_.reads_normals());
+  EXPECT_EQ(Find(aside, 2), 6 * kAsked);
+}
+
+// One that comes late is as telling as one that comes early.
+TEST_F(NormalsTest, AreNoLongerReadOnceOneDisagreed) {
+  Find([&](const Eigen::MatrixXd& x) { return Closest(x); }, 1);
+  ASSERT_TRUE(finder_.reads_normals());
+  const Eigen::MatrixXd on = RandomPointsOn(*torus_, 1, 9);
+  const Eigen::MatrixXd basis = torus_->TangentBasis(on);
+  TangentFinder::Points of;
+  of.points = on;
+  const Eigen::Vector3d along(basis(0, 0), basis(2, 0), basis(4, 0));
+  of.asked = on + 0.1 * along;  // as on an undeclared boundary
+  std::vector<double> guess(6);
+  ToByVector(basis.col(0).data(), 3, 2, guess.data());
+  of.guesses = {guess.data()};
+  finder_.Start(std::move(of));
+  ASSERT_NE(finder_.Next(), nullptr);  // it is turned too far from its guess
+  while (const QueryBlock* block = finder_.Next()) {
+    AnswerBlock answers;
+    answers.points = Closest(block->points);
+    finder_.Absorb(answers);
+  }
+  EXPECT_FALSE(finder_.reads_normals());
+}
+
+TEST_F(NormalsTest, AreTheSameHoweverOftenItStartsAgain) {
+  const auto exact = [&](const Eigen::MatrixXd& x) { return Closest(x); };
+  Find(exact, 1);
+  Find(exact, 2);
+  const Eigen::MatrixXd once = finder_.tangents();
+  finder_ = TangentFinder(2, 3, kStep, 1);
+  Find(exact, 1);
+  Find(exact, 2);
+  EXPECT_EQ(finder_.tangents(), once);
+}
+
 // A surface taken for a curve has no tangent line, and a curve taken for a surface no plane.
 TEST(TangentFinder, RefusesTheWrongDimension) {
   for (const bool too_many : {false, true}) {
     const auto manifold = Make(too_many ? "circle:10" : "flat-torus:4");
     TangentFinder finder(too_many ? 2 : 1, manifold->ambient_dimension(), kStep, 1);
     const Eigen::MatrixXd points = RandomPointsOn(*manifold, kPoints, 3);
-    finder.Start(points, std::vector<const double*>(kPoints, nullptr));
+    finder.Start({points, std::vector<const double*>(kPoints, nullptr)});
     while (const QueryBlock* block = finder.Next())
       finder.Absorb({manifold->ClosestPoint(block->points).points, {}, {}, {}, {}, {}});
     int refused = 0;
