@@ -1,4 +1,4 @@
-"""Thirty-one solids as people write them in numpy: p (n, 3) -> (n,), negative inside, within [-1.3, 1.3]^3.
+"""Thirty-three solids as people write them in numpy: p (n, 3) -> (n,), negative inside, within [-1.3, 1.3]^3.
 
 Of each: how many walls it is traced to, an epsilon that is fine enough for it, and its Euler
 characteristic. Ten more that no walls can be made of.
@@ -62,6 +62,24 @@ def round_cone(p):
 def hexagonal_prism(p):
     k = np.array([[1.0, 0.0], [0.5, np.sqrt(0.75)], [-0.5, np.sqrt(0.75)]])
     return np.maximum(np.abs(p[:, :2] @ k.T).max(axis=1) - 0.8, np.abs(p[:, 2]) - 0.5)
+
+
+def folded_hexagon(p):
+    """The same by folding the plane onto a twelfth of it, as distances to polygons are written."""
+    k, corner = np.array([-np.sqrt(0.75), 0.5]), 0.8 * np.tan(np.pi / 6)
+    q = np.abs(p[:, :2])
+    q = q - 2 * np.minimum(q @ k, 0)[:, None] * k
+    e = np.stack([q[:, 0] - np.clip(q[:, 0], -corner, corner), q[:, 1] - 0.8], axis=1)
+    return np.maximum(norm(e, axis=1) * np.sign(e[:, 1]), np.abs(p[:, 2]) - 0.5)
+
+
+def rod_by_squares(p):
+    """A cylinder with ends, by squares, of which the root is taken last."""
+    x, y = np.hypot(p[:, 0], p[:, 1]) - 0.5, np.abs(p[:, 2]) - 0.8
+    x2, y2 = x * x, 4 * y * y
+    beyond = np.where(x > 0, x2, 0) + np.where(y > 0, y2, 0)
+    d = np.where(np.maximum(x, y) < 0, -np.minimum(x2, y2), beyond)
+    return np.sign(d) * np.sqrt(np.abs(d))
 
 
 def triangular_prism(p):
@@ -248,6 +266,8 @@ FORMULAS = [
     (capped_cone, 2, 0.2, 1),
     (round_cone, 1, 0.1, 1),
     (hexagonal_prism, 7, 0.2, 1),
+    (folded_hexagon, 5, 0.2, 1),
+    (rod_by_squares, 2, 0.15, 1),
     (triangular_prism, 4, 0.2, 1),
     (box_frame, 8, 0.2, -4),
     (pyramid, 5, 0.2, 1),

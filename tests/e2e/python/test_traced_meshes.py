@@ -1,5 +1,6 @@
 """Formulas of the distance-function world, meshed with their edges by the real server."""
 
+import distance_formulas
 import numpy as np
 import pytest
 import stellate
@@ -21,7 +22,17 @@ def share(f):
     return (np.reshape(f(x), -1) < 0).mean() * 2.6**3
 
 
+def block_and_ball(p):
+    """A plate with a ball on it, as users of signed distances begin: a crease is its seam."""
+    block = distance_formulas.box(p, [1.0, 1.0, 0.3])
+    return np.minimum(block, distance_formulas.ball(p, 0.6, (0, 0, 0.6)))
+
+
 CASES = [
+    (block_and_ball, 0.12, 4, 1),
+    (distance_formulas.tray, 0.2, 6, 1),
+    (distance_formulas.pyramid, 0.2, 5, 1),
+    (distance_formulas.chamfered_union, 0.12, 7, 1),
     (formulas.box([0.8, 0.6, 0.5]), 0.2, 3, 1),
     (formulas.capped_cylinder, 0.2, 2, 1),
     (formulas.drilled, 0.1, 7, -4),

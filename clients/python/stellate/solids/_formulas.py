@@ -84,6 +84,8 @@ def make(op: str, *args: Node) -> Node:
         return args[1] if values[0] == 0 else args[0]
     if op == "subtract" and values[1] == 0:
         return args[0]
+    if op == "subtract" and args[0] is args[1]:
+        return constant(0)
     if op == "multiply":
         if 0 in values:
             return constant(0)
@@ -91,6 +93,11 @@ def make(op: str, *args: Node) -> Node:
             return args[1] if values[0] == 1 else args[0]
         if args[0] is args[1]:
             return make("square", args[0])
+        for one, other in (args, args[::-1]):  # 4 * y * y
+            if one.op == "multiply" and other in one.args:
+                times = one.args[0] if one.args[1] is other else one.args[1]
+                if times.op == "constant":
+                    return make("multiply", times, make("square", other))
     if op == "divide" and (values[0] == 0 or values[1] == 1):
         return args[0]
     if op == "power" and values[1] in (0.5, 1, 2):
@@ -98,6 +105,10 @@ def make(op: str, *args: Node) -> Node:
     # Norms of one component, which others are frozen to: they keep their sign, as norms do not.
     if op == "sqrt" and args[0].op == "square":
         return make("absolute", *args[0].args)
+    if op == "sqrt" and args[0].op == "multiply":
+        for one, other in (args[0].args, args[0].args[::-1]):
+            if one.op == "square" and other.op == "constant" and other.value > 0:
+                return make("multiply", make("absolute", *one.args), make("sqrt", other))
     if op == "hypot" and 0 in values:
         return make("absolute", args[1] if values[0] == 0 else args[0])
     if op == "negative" and args[0].op == "negative":
