@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/batch.h"
+#include "core/report.h"
 #include "core/specification.h"
 #include "core/status.h"
 
@@ -61,6 +62,11 @@ struct ChosenEpsilon {
   std::string failure;
 };
 ChosenEpsilon ChooseEpsilon(const ExaminationReport& report);
+
+// The epsilon that "auto" goes on with after a mesh of epsilon `epsilon` with this report: a
+// quarter of the reach that its certificate shows, where the mesh was too coarse for that. Nothing:
+// no smaller one would help.
+std::optional<ChosenEpsilon> ChooseFinerEpsilon(const Report& report, double epsilon);
 
 // What an oracle, or the check of its answers' shape, says of a batch that was not answered.
 struct OracleFault {

@@ -69,6 +69,7 @@ inline constexpr double kReachStep = 0.1;  // of the smaller of reach and size: 
                                            // far along M
 inline constexpr double kSafeRatio = 0.4;  // of epsilon and reach
 inline constexpr double kAutoEpsilon = 4;  // epsilon "auto" is the reach divided by this
+inline constexpr double kAutoLeastShare = 0.25;  // of epsilon: the next is no smaller
 
 // Off M along a normal by these shares of "near", and back.
 inline constexpr double kOffsets[] = {0.05, 0.25};

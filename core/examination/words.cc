@@ -340,4 +340,19 @@ ChosenEpsilon ChooseEpsilon(const ExaminationReport& report) {
           ""};
 }
 
+std::optional<ChosenEpsilon> ChooseFinerEpsilon(const Report& report, double epsilon) {
+  const Certificate& c = report.certificate;
+  const bool ended = report.termination == Termination::kConverged ||
+                     report.termination == Termination::kNoProgress;
+  const double coarsest = examination::kSafeRatio * c.estimated_reach;
+  if (c.certified || c.reach_refuted || !ended || !(coarsest > 0 && coarsest < epsilon)) return {};
+  const std::string why = Message(
+      "a quarter of the reach, about ", examination::Digits(c.estimated_reach, 3),
+      " by the certificate of epsilon ", examination::Digits(epsilon, 6), ", which was too coarse");
+  const double quarter = examination::ToTwoDigits(c.estimated_reach / examination::kAutoEpsilon);
+  const double least = examination::ToTwoDigits(examination::kAutoLeastShare * epsilon);
+  if (quarter < least) return ChosenEpsilon{least, "no finer in one step, though " + why, ""};
+  return ChosenEpsilon{quarter, why, ""};
+}
+
 }  // namespace stellate::core

@@ -17,6 +17,12 @@ v1::Severity SeverityOf(core::Severity severity) {
   return v1::SEVERITY_NOTE;
 }
 
+// The same, what workers said made safe for terminals.
+core::ExaminationReport Printable(core::ExaminationReport report) {
+  for (core::Finding& finding : report.findings) finding.message = text::Printable(finding.message);
+  return report;
+}
+
 }  // namespace
 
 void ToProto(const core::Finding& finding, v1::Finding* out) {
@@ -31,7 +37,7 @@ void ToProto(const core::Finding& finding, v1::Finding* out) {
 void ToProto(const core::ExaminationReport& report, v1::CheckReport* out) {
   out->set_ok(report.ok());
   for (const core::Finding& finding : report.findings) ToProto(finding, out->add_findings());
-  out->set_text(text::PrintableLines(core::ToText(report)));
+  out->set_text(core::ToText(Printable(report)));
   out->set_samples(report.samples);
   out->set_queries(report.queries);
   if (report.reach) out->set_reach(*report.reach);
@@ -42,13 +48,13 @@ void ToProto(const core::ExaminationReport& report, v1::CheckReport* out) {
     measured.set_queries_per_second(rate.queries_per_second);
   }
   out->set_best_batch(static_cast<std::uint32_t>(report.best_batch));
-  const core::ChosenEpsilon chosen = core::ChooseEpsilon(report);
+  const core::ChosenEpsilon chosen = core::ChooseEpsilon(Printable(report));
   if (chosen.failure.empty()) {
     out->set_epsilon(chosen.epsilon);
     out->set_epsilon_reason(chosen.reason);
   } else {
     out->mutable_no_epsilon()->set_reason(chosen.failure);
-    out->mutable_no_epsilon()->set_message(text::PrintableLines(chosen.reason));
+    out->mutable_no_epsilon()->set_message(chosen.reason);
   }
 }
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/base/message.h"
+#include "core/examiner.h"
 #include "server/convert/arrays.h"
 #include "server/convert/error_map.h"
 #include "server/convert/points.h"
@@ -275,6 +276,10 @@ void ToProto(const Session& session, v1::Mesh* out) {
     report->mutable_certificate()->set_verdict(
         VerdictOf(request, view.report->certificate.verdict));
     report->set_elapsed_seconds(view.elapsed_seconds);
+    if (const auto finer = core::ChooseFinerEpsilon(*view.report, request.spec.epsilon)) {
+      report->mutable_finer()->set_epsilon(finer->epsilon);
+      report->mutable_finer()->set_reason(finer->reason);
+    }
     if (view.state == SessionState::kFailed) {
       report->set_termination(v1::TERMINATION_ORACLE_FAILED);
       report->mutable_failure()->set_reason(FailureReasonName(view.failure.reason));

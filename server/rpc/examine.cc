@@ -1,4 +1,5 @@
-#include <deque>
+#include <algorithm>
+#include <chrono>
 #include <memory>
 #include <optional>
 #include <string>
@@ -16,6 +17,9 @@
 
 namespace stellate::server {
 namespace {
+
+// Whoever has an oracle examined serves it: a worker that does not come soon was not able to.
+constexpr std::chrono::seconds kWorkerWait{10};
 
 // One client's examination of an oracle: a session of its own, which ends with the stream.
 class ExamineStream final : public ServerStream<v1::ExamineRequest, v1::ExamineResponse>,
@@ -45,6 +49,10 @@ class ExamineStream final : public ServerStream<v1::ExamineRequest, v1::ExamineR
     if (state().draining) return ShuttingDown();
     auto parsed = ReadSpec(request.spec(), state().config);
     if (!parsed) return Refuse(state(), parsed.error(), "spec.");
+    if (request.spec().limits().worker_wait_seconds() == 0) {
+      auto& wait = parsed->timeouts.worker_wait;
+      wait = std::min<decltype(parsed->timeouts.worker_wait)>(wait, kWorkerWait);
+    }
     std::optional<double> epsilon;
     if (parsed->spec.epsilon != 0) epsilon = parsed->spec.epsilon;
     auto oracle = std::make_shared<ExaminedOracle>(parsed->spec, epsilon);

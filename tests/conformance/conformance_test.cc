@@ -18,7 +18,6 @@
 #include "files.h"
 #include "net/embedded_server.h"
 #include "replay.h"
-#include "run/epsilon.h"
 #include "silent_oracle.h"
 #include "stellate/catalogue.h"
 #include "stellate/client.h"
@@ -226,39 +225,6 @@ void SpoilFlats(const std::string& defect, Oracle& good, const Matrix& centers, 
   }
   if (defect == "off_flat") {
     for (int i = 0; i < 3; ++i) a->points.row(i) += 0.01 * bases.row(2 * i);
-  }
-}
-
-// The report of a mesh that finer.json describes.
-Report ReportOf(const Entry& entry) {
-  Report report;
-  report.epsilon = At(entry, "epsilon").number_value();
-  const Entry& reach = At(entry, "estimated_reach");
-  report.certificate.estimated_reach = reach.has_string_value()  // "Infinity"
-                                           ? std::numeric_limits<double>::infinity()
-                                           : reach.number_value();
-  report.certificate.certified = At(entry, "certified").bool_value();
-  report.certificate.reach_refuted = At(entry, "reach_refuted").bool_value();
-  const std::string end = TextAt(entry, "termination");
-  for (const Termination one : {Termination::kConverged, Termination::kNoProgress,
-                                Termination::kVertexBudget, Termination::kCancelled}) {
-    if (end.empty() || end == TerminationName(one)) {
-      report.termination = one;
-      return report;
-    }
-  }
-  throw std::runtime_error("finer.json has a termination " + end);
-}
-
-TEST(AutoEpsilon, GoesOnAsItSays) {
-  for (const Entry& entry : ListOf("finer.json")) {
-    SCOPED_TRACE(TextAt(entry, "about"));
-    const std::optional<ChosenEpsilon> finer = client::Finer(ReportOf(At(entry, "report")));
-    const Entry& then = At(entry, "then");
-    ASSERT_EQ(finer.has_value(), then.has_struct_value());
-    if (!finer) continue;
-    EXPECT_EQ(finer->epsilon, At(then, "epsilon").number_value());
-    EXPECT_EQ(finer->reason, TextAt(then, "reason"));
   }
 }
 

@@ -41,14 +41,16 @@ TEST_F(AutoEpsilon, GoesOnWithTheReachThatTheCertificateShows) {
   const Expected<Mesh> coarse = MeshManifold(hourglass, At(first->epsilon));
   ASSERT_TRUE(coarse.has_value()) << coarse.error().message;
   ASSERT_FALSE(coarse->report.certified()) << "a quarter of the reach that was found will do";
+  ASSERT_TRUE(coarse->report.finer.has_value());
+  EXPECT_LT(coarse->report.finer->epsilon, first->epsilon);
 
   const Expected<Mesh> mesh = MeshManifold(hourglass, Auto());
   ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
   const Report& report = mesh->report;
   EXPECT_TRUE(report.certified()) << report.certificate.verdict;
   EXPECT_EQ(report.certificate.euler_characteristic, 2);
-  EXPECT_LT(report.epsilon, first->epsilon);
-  EXPECT_LE(report.epsilon, 0.4 * report.certificate.estimated_reach);
+  EXPECT_EQ(report.epsilon, coarse->report.finer->epsilon);
+  EXPECT_EQ(report.epsilon_reason, coarse->report.finer->reason);
   EXPECT_TRUE(Says(report.epsilon_reason, "by the certificate of epsilon 0."))
       << report.epsilon_reason;
   EXPECT_TRUE(Says(report.epsilon_reason, "which was too coarse")) << report.epsilon_reason;
@@ -64,6 +66,7 @@ TEST_F(AutoEpsilon, IsLeftAloneWhereItWillDo) {
   const Expected<Mesh> mesh = MeshManifold(*torus, Auto());
   ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
   EXPECT_TRUE(mesh->report.certified()) << mesh->report.certificate.verdict;
+  EXPECT_FALSE(mesh->report.finer.has_value());
   EXPECT_NEAR(mesh->report.epsilon, 0.1, 0.005);
   EXPECT_TRUE(Says(mesh->report.epsilon_reason, " queries")) << mesh->report.epsilon_reason;
 }

@@ -12,7 +12,7 @@
 #include "run/check_report.h"
 #include "run/rank.h"
 #include "run/worker.h"
-#include "shared/doctor.h"
+#include "shared/equations.h"
 #include "stellate/client.h"
 #include "stellate/v1/stellate.grpc.pb.h"
 #include "wire/convert.h"
@@ -123,7 +123,7 @@ std::optional<Finding> ExamineEquations(Oracle& oracle, std::uint64_t random_see
   try {
     const std::optional<Singular> singular = FindSingular(oracle, random_seed);
     if (!singular) return std::nullopt;
-    const auto& [message, advice] = doctor::kSingular;
+    const auto& [message, advice] = equations::kSingular;
     return Finding{Severity::kError,
                    "SINGULAR",
                    Filled(Filled(message, "{query}", Shown(singular->place)), "{ratio}",

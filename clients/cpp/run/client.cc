@@ -4,10 +4,9 @@
 #include <utility>
 
 #include "run/declare.h"
-#include "run/epsilon.h"
 #include "run/host.h"
 #include "run/run.h"
-#include "shared/doctor.h"
+#include "shared/auto.h"
 #include "stellate/monitor.h"
 
 namespace stellate {
@@ -17,15 +16,14 @@ Expected<Mesh> MeshManifold(Oracle& oracle, const MeshOptions& options) {
   if (!host) return tl::unexpected(host.error());
   Expected<client::Request> request = client::Settle(*host, oracle, options);
   if (!request) return tl::unexpected(request.error());
-  for (int retries = options.epsilon == kAuto ? doctor::kAutoRetries : 0;; --retries) {
+  for (int retries = options.epsilon == kAuto ? automatic::kRetries : 0;; --retries) {
     client::Run run(host->channel, oracle, request->options, host->IsHopeless());
     Expected<Mesh> mesh = run.Go();
     if (!mesh) return mesh;
     client::Tell(request->epsilon_reason, &mesh->report);
-    if (retries == 0 || options.stop.stop_requested()) return mesh;
-    const std::optional<ChosenEpsilon> finer = client::Finer(mesh->report);
-    if (!finer) return mesh;
-    client::Take(*finer, &*request);
+    const bool goes_on = retries > 0 && mesh->report.finer && !options.stop.stop_requested();
+    if (!goes_on) return mesh;
+    client::Take(*mesh->report.finer, &*request);
   }
 }
 

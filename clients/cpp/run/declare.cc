@@ -1,6 +1,7 @@
 #include "run/declare.h"
 
 #include <chrono>
+#include <cstdio>
 #include <utility>
 
 #include "net/channel.h"
@@ -32,6 +33,14 @@ void Take(const ChosenEpsilon& chosen, Request* request) {
   request->options.epsilon = chosen.epsilon;
   request->epsilon_reason = chosen.reason;
   if (request->options.on_epsilon) request->options.on_epsilon(chosen.epsilon, chosen.reason);
+}
+
+void Tell(const std::string& epsilon_reason, Report* report) {
+  if (epsilon_reason.empty()) return;
+  char epsilon[32];
+  std::snprintf(epsilon, sizeof epsilon, "%g", report->epsilon);
+  report->epsilon_reason = epsilon_reason;
+  report->text += std::string("      epsilon  ") + epsilon + ", " + epsilon_reason + "\n";
 }
 
 Expected<std::string> CreateMesh(v1::Stellate::Stub& stub, Oracle& oracle,

@@ -22,6 +22,10 @@ Expected<Request> Settle(const Host& host, Oracle& oracle, const MeshOptions& op
 // Sets the epsilon that was chosen, and reports it.
 void Take(const ChosenEpsilon& chosen, Request* request);
 
+// Adds to a report why the epsilon of its mesh was chosen, which the server does not know; empty:
+// it was given.
+void Tell(const std::string& epsilon_reason, Report* report);
+
 // The name of a new mesh. Not tried again when it fails: whether the server made the mesh would not
 // be known.
 Expected<std::string> CreateMesh(v1::Stellate::Stub& stub, Oracle& oracle,

@@ -8,15 +8,15 @@
 #include <string>
 #include <vector>
 
-#include "shared/doctor.h"
+#include "shared/equations.h"
 
 namespace stellate::client {
 namespace {
 
 using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
 using Indices = std::vector<Index>;
-using doctor::kLeastRankShare, doctor::kRankDescents, doctor::kRankFirstStep, doctor::kRankLastStep,
-    doctor::kRankRounds, doctor::kSeedSpread;
+using equations::kLeastRankShare, equations::kRankDescents, equations::kRankFirstStep,
+    equations::kRankLastStep, equations::kRankRounds, equations::kSeedSpread;
 
 constexpr Index kStarts = 400;
 constexpr int kWays = 2;  // that are tried at a time, each forth and back

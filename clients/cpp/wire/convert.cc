@@ -259,6 +259,7 @@ Report ReportOf(const v1::Mesh& mesh) {
   r.failure_message = m.failure().message();
   r.elapsed_seconds = m.elapsed_seconds();
   r.text = m.text();
+  if (m.has_finer()) r.finer = ChosenEpsilon{m.finer().epsilon(), m.finer().reason()};
   if (m.has_reconstruction()) r.reconstruction = FromProto(m.reconstruction());
   const v1::Counts& n = m.counts();
   r.counts = {n.vertices(),

@@ -27,6 +27,8 @@ export interface Report {
   epsilon: number;
   /** Why it is that, where mesh() or watch() chose it; else "". */
   epsilonReason: string;
+  /** With which epsilon to mesh again, where this one was too coarse for a certificate: "auto" does. */
+  finer?: { epsilon: number; reason: string };
   /** All of it in several lines, for people. */
   text: string;
 }
@@ -66,6 +68,7 @@ export function reportFrom(message: Report__Output, epsilon: number): Report {
     elapsedSeconds: message.elapsedSeconds,
     epsilon,
     epsilonReason: "",
+    finer: message.finer ?? undefined,
     text: message.text,
   };
 }

@@ -31,7 +31,7 @@ execFileSync(
 );
 cpSync(`${protos}/stellate`, at("../dist/proto/stellate"), { recursive: true });
 
-const shared = ["doctor", "reconnect", "checkpoint"].map((name) => {
+const shared = ["auto", "reconnect", "checkpoint"].map((name) => {
   const table = readFileSync(at(`../../shared/${name}.toml`), "utf8");
   const rows = [...table.matchAll(/^(\w+) = ("[^"]*"|-?[0-9][^\s#]*)/gm)];
   const values = rows.map((row) => `  ${row[1]}: ${row[2]},\n`).join("");

@@ -8,9 +8,7 @@ from typing import Any, Callable, Literal, Union
 import numpy as np
 
 from ._findings import CheckReport
-from ._shared import table
 from .errors import InvalidArgument, OracleError
-from .report import Report
 
 Auto = Literal["auto"]
 Epsilon = Union[float, Auto]  # a length, or to be chosen
@@ -44,27 +42,3 @@ def choose(
         f"epsilon='auto' cannot be chosen: {report.epsilon_reason}",
         "ORACLE_NO_REACH" if report.ok else "ORACLE_BREAKS_CONTRACT",
     )
-
-
-def finer(report: Report) -> tuple[float, str] | None:
-    """What "auto" goes on with after a mesh, and why; None: nothing that a smaller one would mend."""
-    rule, certificate, epsilon = table("doctor.toml"), report.certificate, report.epsilon
-    reach = certificate.estimated_reach
-    ended = report.termination in ("CONVERGED", "NO_PROGRESS")
-    if certificate.certified or certificate.reach_refuted or not ended or epsilon is None:
-        return None
-    if not (0 < rule["safe_ratio"] * reach < epsilon):
-        return None
-    why = f"about {reach:.3g} by the certificate of epsilon {epsilon:g}, which was too coarse"
-    least = _rounded(rule["auto_least_share"] * epsilon)
-    if _quarter(reach) < least:
-        return least, f"no finer in one step, though a quarter of the reach, {why}"
-    return _quarter(reach), f"a quarter of the reach, {why}"
-
-
-def _quarter(reach: float) -> float:
-    return _rounded(reach / table("doctor.toml")["auto_epsilon"])
-
-
-def _rounded(length: float) -> float:
-    return float(f"{length:.2g}")

@@ -9,7 +9,7 @@ import numpy as np
 from ._rows import Array, Flags, apply, norms
 from ._shared import table
 
-_K = table("doctor.toml")
+_K = table("equations.toml")
 _WAYS = 2  # that are tried at a time, each forth and back
 
 

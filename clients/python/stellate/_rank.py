@@ -13,7 +13,7 @@ from ._rows import norms
 from ._shared import table
 from .oracle import CheckedOracle
 
-_K: Mapping[str, Any] = table("doctor.toml")
+_K: Mapping[str, Any] = table("equations.toml")
 _STARTS = 400
 
 

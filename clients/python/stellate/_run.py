@@ -11,7 +11,7 @@ from types import TracebackType
 from typing import Any, Callable, TypeVar
 
 from ._checkpoint import Checkpoint
-from ._epsilon import Epsilon, choose, finer
+from ._epsilon import Epsilon, choose
 from ._findings import CheckReport
 from ._follow import Following, OnProgress
 from ._mesh import FinishedMesh, Mesh
@@ -162,7 +162,7 @@ class Run:
             )
         )
         kept = checkpoint.retries if checkpoint is not None else None
-        most = table("doctor.toml")["auto_retries"] if kept is None else kept
+        most = table("auto.toml")["retries"] if kept is None else kept
         self._retries = most if self._epsilon_reason else 0
         self._interrupted = self._ended = False
         self._next: tuple[float, str] | None = None  # what epsilon is to be tried after this one
@@ -266,7 +266,8 @@ class Run:
         """What is to follow a mesh that is over."""
         if self._retries == 0 or self._interrupted or mesh.report is None:
             return None
-        return finer(mesh.report)
+        finer = mesh.report.finer
+        return None if finer is None else (finer.epsilon, finer.reason)
 
     def _begin_anew(self, choice: tuple[float, str]) -> None:
         self._retries -= 1

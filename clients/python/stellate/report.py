@@ -22,6 +22,7 @@ __all__ = [
     "FaceCertificate",
     "RegionCertificate",
     "Failure",
+    "FinerEpsilon",
     "Progress",
     "ReconstructionReport",
     "Report",
@@ -261,6 +262,14 @@ class Failure:
 
 
 @dataclasses.dataclass(frozen=True)
+class FinerEpsilon:
+    """With which epsilon to mesh again."""
+
+    epsilon: float
+    reason: str
+
+
+@dataclasses.dataclass(frozen=True)
 class Report:
     """The end of a mesh. `str(report)` is for people."""
 
@@ -275,6 +284,7 @@ class Report:
         ""  # all of it in several lines, for people, but for epsilon; each line with its "\n"
     )
     reconstruction: ReconstructionReport | None = None  # of a mesh of points, else None
+    finer: FinerEpsilon | None = None  # where this epsilon was too coarse for a certificate
 
     @property
     def certified(self) -> bool:
@@ -294,8 +304,8 @@ class Report:
     def to_dict(self) -> dict[str, Any]:
         """All of it as plain values for JSON, with the names of the protocol.
 
-        The same as the shell's --report writes, without `text`: what is not known, infinite or no number is None,
-        "failure" is there for a mesh that failed, "reconstruction" for one of points.
+        The same as the shell's --report writes, without `text` and `finer`: what is not known, infinite or
+        no number is None, "failure" is there for a mesh that failed, "reconstruction" for one of points.
         """
         whole: dict[str, Any] = {"termination": self.termination}
         if self.failure is not None:
@@ -331,11 +341,13 @@ class Report:
         if certificate.get("sharpest"):
             certificate["sharpest"] = WallAngle.from_fields(certificate["sharpest"])
         told = dict(fields.get("reconstruction") or {})  # checkpoints of earlier versions lack it
+        finer = fields.get("finer")  # likewise
         if told:
             told["looks"] = tuple(told["looks"])
         more = {
             "reconstruction": ReconstructionReport(**told) if told else None,
             "failure": failure and Failure(**failure),
+            "finer": FinerEpsilon(**finer) if finer else None,
             "counts": Counts(**fields["counts"]),
             "certificate": Certificate(**certificate),
         }
@@ -357,6 +369,11 @@ class Report:
             reconstruction=(
                 ReconstructionReport.from_wire(message.reconstruction)
                 if message.HasField("reconstruction")
+                else None
+            ),
+            finer=(
+                FinerEpsilon(message.finer.epsilon, message.finer.reason)
+                if message.HasField("finer")
                 else None
             ),
         )

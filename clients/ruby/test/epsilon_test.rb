@@ -1,12 +1,9 @@
 # frozen_string_literal: true
 
-require 'json'
 require_relative 'live'
 
 # The epsilon 'auto', and what it goes on with.
 class EpsilonTest < Minitest::Test
-  CASES = JSON.parse(File.read(File.join(__dir__, '../../../tests/conformance/finer.json')))
-
   # The unit circle, and a small one beside it that few questions of the doctor fall upon.
   class TwoCircles
     attr_reader :asked
@@ -26,21 +23,11 @@ class EpsilonTest < Minitest::Test
     end
   end
 
-  def test_what_the_kit_says
-    CASES.each do |one|
-      said = one['report']
-      proved = Stellate::V1::Certificate.new(
-        certified: said.fetch('certified', false), reach_refuted: said.fetch('reach_refuted', false),
-        estimated_reach: said['estimated_reach'] == 'Infinity' ? Float::INFINITY : said['estimated_reach']
-      )
-      termination = :"TERMINATION_#{said.fetch('termination', 'CONVERGED')}"
-      report = Stellate::V1::Report.new(certificate: proved, termination:)
-      first = Stellate::Choice.new(said['epsilon'], 'so', 2)
-      found = first.finer(report)
-      assert_equal [one['then']&.values], [found && [found.epsilon, found.reason]], one['about']
-      assert_equal 1, found.retries if found
-      assert_nil Stellate::Choice.new(said['epsilon'], 'so', 0).finer(report)
-    end
+  def test_a_mesh_is_followed_by_what_its_report_says_so_often
+    report = Stellate::V1::Report.new(finer: { epsilon: 0.05, reason: 'so' })
+    assert_equal [0.05, 'so', 1], Stellate::Choice.new(0.1, '', 2).finer(report).to_a
+    assert_nil Stellate::Choice.new(0.1, '', 0).finer(report)
+    assert_nil Stellate::Choice.new(0.1, '', 2).finer(Stellate::V1::Report.new)
   end
 
   def test_auto_goes_on_and_a_checkpoint_knows_of_it
@@ -54,7 +41,8 @@ class EpsilonTest < Minitest::Test
       assert_includes error.message, 'the same call goes on from there'
       coarse = ends.first
       assert_equal [1, false, told[0]], [ends.size, coarse.certified?, [coarse.epsilon, coarse.epsilon_reason]]
-      assert_equal told[1], Stellate::Choice.finer_epsilon(coarse.epsilon, coarse.report)
+      finer = coarse.report.finer
+      assert_equal told[1], [finer.epsilon, finer.reason]
       see_it_finished(told, options)
     end
   end

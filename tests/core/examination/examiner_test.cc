@@ -240,6 +240,60 @@ TEST(ChooseEpsilon, RefusesAnOracleThatBreaksItsContract) {
   EXPECT_EQ(chosen.reason.find("note "), std::string::npos) << chosen.reason;
 }
 
+struct Ended {
+  const char* about;
+  double epsilon, reach;  // that the certificate shows
+  double finer = 0;       // 0: none
+  core::Termination termination = core::Termination::kConverged;
+  bool certified = false, refuted = false;
+};
+
+TEST(ChooseFinerEpsilon, IsAQuarterOfTheReachThatACertificateShows) {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
+  using enum core::Termination;
+  const Ended all[] = {
+      {"a quarter", 0.1, 0.2, 0.05},
+      {"no progress is an end, too", 0.1, 0.0152, 0.025, kNoProgress},
+      {"never finer in one step than a quarter of before", 0.1, 0.001, 0.025},
+      {"two digits, the even one where two are equally near", 0.3, 0.5, 0.12},
+      {"the odd one where the even one is farther", 0.3, 0.5000001, 0.13},
+      {"large lengths", 2000, 4711, 1200},
+      {"certified", 0.1, 0.2, 0, kConverged, true},
+      {"the declared reach is wrong", 0.1, 0.2, 0, kConverged, false, true},
+      {"fine enough: what was refused is something else", 0.1, 0.26},
+      {"nothing bends", 0.1, kInfinity},
+      {"no reach was seen", 0.1, 0},
+      {"a mesh of points has no epsilon", 0, 0.2},
+      {"the budget ended it", 0.1, 0.2, 0, kVertexBudget},
+      {"it was cancelled", 0.1, 0.2, 0, kCancelled},
+  };
+  for (const Ended& ended : all) {
+    SCOPED_TRACE(ended.about);
+    core::Report report;
+    report.termination = ended.termination;
+    report.certificate.estimated_reach = ended.reach;
+    report.certificate.certified = ended.certified;
+    report.certificate.reach_refuted = ended.refuted;
+    const auto chosen = core::ChooseFinerEpsilon(report, ended.epsilon);
+    EXPECT_EQ(chosen ? chosen->epsilon : 0, ended.finer);
+  }
+}
+
+TEST(ChooseFinerEpsilon, SaysWhy) {
+  core::Report report;
+  report.termination = core::Termination::kConverged;
+  report.certificate.estimated_reach = 4711;
+  EXPECT_EQ(
+      core::ChooseFinerEpsilon(report, 2000)->reason,
+      "a quarter of the reach, about 4.71e+03 by the certificate of epsilon 2000, which was too "
+      "coarse");
+  report.certificate.estimated_reach = 0.0152;
+  EXPECT_EQ(
+      core::ChooseFinerEpsilon(report, 0.1)->reason,
+      "no finer in one step, though a quarter of the reach, about 0.0152 by the certificate of "
+      "epsilon 0.1, which was too coarse");
+}
+
 TEST(Examiner, ReadsWell) {
   const auto torus = MakeManifold("torus:1:0.4").value();
   SpoiledOracle oracle(*torus);

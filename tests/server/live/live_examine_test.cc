@@ -32,6 +32,7 @@ class Examination {
       return "";
     }
     EXPECT_EQ(response.mesh().state(), v1::MESH_STATE_WAITING);
+    worker_wait = response.mesh().spec().limits().worker_wait_seconds();
     return response.mesh().name();
   }
 
@@ -53,6 +54,7 @@ class Examination {
   std::vector<std::string> codes;  // of the findings, as they came
   v1::CheckReport report;
   bool is_reported = false;
+  double worker_wait = 0;  // seconds
 
  private:
   void Keep(const v1::ExamineResponse& response) {
@@ -107,7 +109,7 @@ TEST_F(LiveExamineTest, SaysWhatItFindsAndLeavesNothing) {
   EXPECT_TRUE(report.epsilon_reason().starts_with("a quarter of the reach, about 1 by "));
   EXPECT_EQ(report.pieces(), 1u);
   EXPECT_FALSE(report.rates().empty());
-  EXPECT_NE(report.text().find("The oracle keeps its contract: 0 errors"), std::string::npos);
+  EXPECT_NE(report.text().find("\nThe oracle keeps its contract: 0 errors"), std::string::npos);
   std::set<std::string> streamed(examination.codes.begin(), examination.codes.end()), reported;
   for (const v1::Finding& finding : report.findings()) reported.insert(finding.code());
   EXPECT_EQ(streamed, reported);
@@ -260,6 +262,18 @@ TEST_F(LiveExamineTest, EndsWhenItsMeshIsCancelled) {
   ASSERT_TRUE(stub_->CancelMesh(&context, request, &mesh).ok());
   EXPECT_EQ(examination.Finish().error_code(), StatusCode::CANCELLED);
   EXPECT_TRUE(Goes(request.name()));
+}
+
+TEST_F(LiveExamineTest, GivesUpSoonOnAWorkerThatDoesNotCome) {
+  Start();
+  Examination hasty(stub_.get(), SpecOfSphere());
+  ASSERT_NE(hasty.Name(), "");
+  EXPECT_EQ(hasty.worker_wait, 10);
+  v1::MeshSpec spec = SpecOfSphere();
+  spec.mutable_limits()->set_worker_wait_seconds(33);
+  Examination patient(stub_.get(), spec);
+  ASSERT_NE(patient.Name(), "");
+  EXPECT_EQ(patient.worker_wait, 33);
 }
 
 TEST_F(LiveExamineTest, WaitsForAWorkerNoLongerThanAMesh) {

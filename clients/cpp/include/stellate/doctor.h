@@ -12,6 +12,7 @@
 #include "stellate/connection.h"
 #include "stellate/error.h"
 #include "stellate/oracle.h"
+#include "stellate/report.h"
 
 namespace stellate {
 
@@ -68,11 +69,6 @@ struct CheckOptions {
 // not an exception. Returns an error if there was no examination: kServerFailed, kRefused, or
 // kStopped.
 Expected<CheckReport> Check(Oracle& oracle, const CheckOptions& options = {});
-
-struct ChosenEpsilon {
-  double epsilon = 0;
-  std::string reason;  // a sentence
-};
 
 // Returns a quarter of the reach that Check estimates, to two digits. kOracleFailed, with the
 // findings, if the oracle breaks its contract; or an error of Check.

@@ -180,6 +180,11 @@ struct ReconstructionReport {
                               // 4, and more
 };
 
+struct ChosenEpsilon {
+  double epsilon = 0;
+  std::string reason;  // a sentence
+};
+
 struct Report {
   Termination termination = Termination::kUnknown;
   std::string failure_reason, failure_message;  // kOracleFailed only
@@ -189,6 +194,9 @@ struct Report {
   double elapsed_seconds = 0;
   double epsilon = 0;          // of the mesh; 0: not known
   std::string epsilon_reason;  // why it was chosen; empty if it was given
+  // With which epsilon to mesh again, where this one was too coarse for a certificate: what kAuto
+  // goes on with. ToJson leaves it out.
+  std::optional<ChosenEpsilon> finer;
   // All of it in several lines, for people, each with its '\n': the server's words, and why epsilon
   // was chosen. ToJson leaves it out.
   std::string text;
