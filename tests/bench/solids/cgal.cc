@@ -7,7 +7,7 @@
 #include <CGAL/make_mesh_3.h>
 
 #include <algorithm>
-#include <limits>
+#include <functional>
 #include <map>
 
 #include "tests/bench/peers/meter.h"
@@ -28,11 +28,8 @@ using Criteria = CGAL::Mesh_criteria_3<Triangulation>;
 
 SolidMesh MeshWithCgal(const Solid& solid, double epsilon, const std::vector<Curve>& edges,
                        bool optimized) {
-  const auto inside = [&walls = solid.domain.walls](const Point& p) {
-    const Eigen::VectorXd x = Eigen::Vector3d(p.x(), p.y(), p.z());
-    double least = std::numeric_limits<double>::infinity();
-    for (const auto& wall : walls) least = std::min(least, wall(x, nullptr));
-    return -least;  // negative inside
+  const std::function<int(const Point&)> label = [&solid](const Point& p) {
+    return solid.LabelAt({p.x(), p.y(), p.z()});
   };
   const Eigen::VectorXd centre = (solid.domain.box.lower + solid.domain.box.upper) / 2;
   const double radius = (solid.domain.box.upper - solid.domain.box.lower).norm() / 2;
@@ -45,9 +42,8 @@ SolidMesh MeshWithCgal(const Solid& solid, double epsilon, const std::vector<Cur
   SolidMesh mesh;
   const double began = ProcessorSeconds();
   // The error of a boundary's points, as a share of the ball's radius: well below the mesh's own.
-  Domain domain = Domain::create_implicit_mesh_domain(
-      inside, Kernel::Sphere_3(Point(centre[0], centre[1], centre[2]), radius * radius),
-      CGAL::parameters::relative_error_bound = 0.01 * epsilon * epsilon / radius);
+  Domain domain(label, Kernel::Sphere_3(Point(centre[0], centre[1], centre[2]), radius * radius),
+                0.01 * epsilon * epsilon / radius);
   domain.add_features(curves.begin(), curves.end());
   const Criteria criteria(CGAL::parameters::edge_size = epsilon, CGAL::parameters::facet_angle = 25,
                           CGAL::parameters::facet_size = epsilon,
@@ -73,8 +69,11 @@ SolidMesh MeshWithCgal(const Solid& solid, double epsilon, const std::vector<Cur
       corners[static_cast<std::size_t>(i)] = entry->second;
     }
     mesh.cells.push_back(corners);
+    mesh.labels.push_back(complex.subdomain_index(cell));
   }
-  mesh.note = optimized ? "perturbed and exuded" : "refined alone";
+  mesh.note = edges.empty() ? "no edges given"
+              : optimized   ? "perturbed and exuded"
+                            : "refined alone";
   return mesh;
 }
 

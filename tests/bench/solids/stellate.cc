@@ -71,6 +71,9 @@ SolidMesh MeshWithStellate(const Solid& solid, double epsilon, std::vector<Curve
   testing::Domain domain = solid.domain;
   core::Specification spec = domain.SpecificationFor(epsilon);
   spec.threads = 1;
+  if (solid.label)
+    for (core::WallSet signs = 0; signs < core::SetOfWall(spec.walls); ++signs)
+      spec.labels.push_back(static_cast<std::int8_t>(solid.label(signs)));
   SolidMesh mesh;
   std::vector<core::WallSet> walls;
   const double began = ProcessorSeconds();
@@ -93,6 +96,9 @@ SolidMesh MeshWithStellate(const Solid& solid, double epsilon, std::vector<Curve
   for (Eigen::Index j = 0; j < points.cols(); ++j) mesh.points.emplace_back(points.col(j));
   for (std::size_t s = 0; s < simplices.size(); s += 4)
     mesh.cells.push_back({simplices[s], simplices[s + 1], simplices[s + 2], simplices[s + 3]});
+  const std::vector<std::int8_t> labels = (*mesher)->Labels();
+  mesh.labels.assign(labels.begin(), labels.end());
+  mesh.labels.resize(mesh.cells.size(), 1);  // without labels all is one region
   const core::Certificate& certificate = (*mesher)->report().certificate;
   mesh.note = certificate.certified ? "certified" : certificate.verdict;
   *edges = CurvesOf(domain, mesh, walls);

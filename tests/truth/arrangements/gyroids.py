@@ -31,6 +31,7 @@ _HALF = 1.8  # of the box's side; the ball's and the cylinder's radius is a litt
 _SHARE = 0.35  # of what bends and of half of what is thick
 _LEAST, _MOST = 0.14, 0.5  # of epsilon, where a period is 2 pi
 _GRID = 72
+_COARSE = 0.4
 _STARTS = 700
 _BOUNDS = [10, 15, 20, 30]
 _CLASSES = ["0 to 10", "10 to 15", "15 to 20", "20 to 30", "30 degrees or more"]
@@ -249,6 +250,7 @@ class Run:
     seconds: float = 0.0
     angle: float = 180.0
     meeting: float = 90.0  # degrees, the least angle of walls
+    coarse: bool = False  # epsilon is above 0.4 of what bends, as near a level with singular points
 
 
 def periodic(level: Level) -> Any:
@@ -284,8 +286,8 @@ def _judge_period(mesh: Any, cell: Any, level: Level, epsilon: float) -> list[st
 def one(
     surface: str, kind: str, place: str, fraction: float, seed: int, places: int, server: Any
 ) -> Run:
-    run = Run(surface, kind, place, fraction)
     level = level_of(surface, kind, fraction)
+    run = Run(surface, kind, place, fraction, coarse=level.epsilon > _COARSE * level.bend)
     rng = np.random.default_rng([seed, *map(ord, surface + kind + place), int(100 * fraction)])
     motion = Motion.random(rng, 3)
     if place != "periodic":
@@ -328,7 +330,7 @@ def one(
 
 def table(runs: list[Run]) -> str:
     words = ["certified", "unseen", "false", "not certified", "refused"]
-    lines = [f"{'':28s} runs {' '.join(words)}  vertices  us/vertex  least angle"]
+    lines = [f"{'':34s} runs {' '.join(words)}  vertices  us/vertex  least angle"]
     groups = collections.defaultdict(list)
     for run in runs:
         groups[f"{run.surface}, {run.kind}"].append(run)
@@ -336,17 +338,24 @@ def table(runs: list[Run]) -> str:
         groups[f"{run.kind}, fraction {run.fraction:g}"].append(run)
         if run.place != "periodic":
             groups[f"walls meet at {_CLASSES[np.searchsorted(_BOUNDS, run.meeting)]}"].append(run)
+        if run.coarse:
+            groups["all but singular levels"].append(run)
+        elif run.meeting >= 15:
+            groups["others, walls at 15 or more"].append(run)
         groups["all"].append(run)
-    order = sorted(
-        groups, key=lambda g: (g == "all", "fraction" in g, "in a" in g or g == "periodic")
-    )
+    ranks = ["in a", "periodic", "skeletal, f", "sheet, f", "walls", "all but", "others", "all"]
+
+    def rank(name: str) -> int:
+        return next((i for i, begin in enumerate(ranks) if name.startswith(begin)), -1)
+
+    order = sorted(groups, key=lambda name: (rank(name), name))
     for name in order:
         own = groups[name]
         counts = collections.Counter(run.outcome for run in own)
         done = [run for run in own if run.vertices] or [Run("", "", "", 0, vertices=1)]
         vertices = sum(run.vertices for run in done)
         lines.append(
-            f"{name:28s} {len(own):4d} "
+            f"{name:34s} {len(own):4d} "
             + " ".join(f"{counts[word]:{len(word)}d}" for word in words)
             + f" {vertices / len(done):9.0f} {1e6 * sum(r.seconds for r in done) / vertices:10.0f}"
             + f" {min(run.angle for run in own):12.1f}"
