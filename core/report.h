@@ -39,6 +39,7 @@ struct Progress {
   std::uint64_t bad_radius_edge = 0;   // ... R2
   std::uint64_t bad_sliver = 0;        // ... R3
   std::uint64_t bad_inconsistent = 0;  // ... R4; R3 and R4 are counted once R1 and R2 hold
+  std::uint64_t bad_protection = 0;    // ... R5, which is counted once all others hold
   double fraction = 0;                 // estimated share of the work done, 0..1; never falls
   bool is_foreseeable = false;         // the fraction allows to estimate how long the rest takes
 };
@@ -70,6 +71,7 @@ struct Counts {
   std::uint64_t inserted_radius_edge = 0;   // R2
   std::uint64_t inserted_sliver = 0;        // R3
   std::uint64_t inserted_inconsistent = 0;  // R4
+  std::uint64_t inserted_protection = 0;    // R5
   std::uint64_t duplicates = 0;             // answers that fell on an existing sample point
 };
 
@@ -146,6 +148,27 @@ struct Violations {
   std::vector<std::uint32_t> fibres;        // vertices near which a normal flat fails; ascending
 };
 
+// How well a finished mesh is protected, where Criteria::protection asks for that
+// (docs/using/protection.md). The gap of a simplex is how much farther than its circumradius the
+// nearest other vertex is from its centre: from the centre where stars judge it, and from the worst
+// of them, where that is one in each vertex's tangent space.
+struct ProtectionReport {
+  double asked = 0;                  // length
+  double least = 0;                  // gap, length; below 0: a ball is not empty
+  double percentile = 0;             // gap that 99 % of the simplices have or exceed, length
+  double median = 0;                 // gap, length
+  double least_ratio = 0;            // least gap / circumradius
+  std::uint64_t weak = 0;            // simplices whose gap is less than asked
+  std::vector<std::uint32_t> worst;  // the simplex with the least gap: k+1 vertex ids
+  // Vertices that each move by less than this, a length, change no simplex of the mesh.
+  double stability_radius = 0;
+  // No simplex has a height of less than this share of k times its longest edge.
+  double thickness_bound = 0;
+  // If the reach is as declared, the intrinsic and the restricted Delaunay complex of the vertices,
+  // and their stars in tangent spaces, are all this mesh.
+  bool is_delaunay = false;
+};
+
 // The certificate, computed from the finished complex; nothing in it is assumed.
 struct Certificate {
   bool certified = false;             // every claim below holds, and the run converged
@@ -207,6 +230,7 @@ struct Certificate {
                                  // is too coarse, for the reach, to be certified
 
   Violations violations;
+  std::optional<ProtectionReport> protection;  // if it was asked for, and the mesh is a complex
 };
 
 struct Report {

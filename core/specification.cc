@@ -248,6 +248,32 @@ Status CheckReach(const Specification& spec) {
   return Status::Ok();
 }
 
+Status CheckProtection(const Specification& spec) {
+  const double asked = spec.criteria.protection;
+  if (asked == 0) return Status::Ok();
+  const auto invalid = [](const std::string& message) {
+    return Invalid("criteria.protection", message);
+  };
+  if (spec.dimension > 3)
+    return invalid(Message("criteria.protection is set for dimension ", spec.dimension,
+                           ", but only manifolds of dimension 3 and less can be protected: leave "
+                           "it out"));
+  const double most = spec.dimension <= 2 ? kMaxProtection : kMaxProtectionOfSolids;
+  if (!(asked > 0 && asked <= most))
+    return invalid(Message("criteria.protection is ", asked, " but in dimension ", spec.dimension,
+                           " must be between 0 and ", most,
+                           ", a share of epsilon: 0 turns the rule off"));
+  if (spec.walls > 0)
+    return invalid(
+        "criteria.protection is set together with walls, but only closed manifolds can be "
+        "protected: leave one of them out");
+  if (spec.criteria.size_rate || spec.criteria.max_deviation)
+    return invalid(
+        "criteria.protection is set together with size_rate or max_deviation, but only meshes of "
+        "one size can be protected: leave one of them out");
+  return Status::Ok();
+}
+
 Status CheckCriteria(const Criteria& c) {
   if (!(c.radius_edge_bound > 1 && c.radius_edge_bound <= kMaxLength)) {
     return Invalid("criteria.radius_edge_bound",
@@ -335,6 +361,7 @@ Status Validate(const Specification& spec) {
   if (status.ok()) status = CheckSeeds(spec);
   if (status.ok()) status = CheckReach(spec);
   if (status.ok()) status = CheckCriteria(spec.criteria);
+  if (status.ok()) status = CheckProtection(spec);
   if (status.ok()) status = CheckLimits(spec);
   return status;
 }

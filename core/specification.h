@@ -21,6 +21,8 @@ inline constexpr double kMaxLength = 1e45;
 
 inline constexpr double kMaxSliverBound = 0.3;  // refinement does not terminate above
 inline constexpr int kMaxCandidates = 100;
+// Rule R5: more is seldom reached by inserting points.
+inline constexpr double kMaxProtection = 0.1, kMaxProtectionOfSolids = 0.05;  // k <= 2, k = 3
 inline constexpr int kMaxFlatAlternations = 20;
 inline constexpr int kMaxBoxSeeds = 100'000;
 inline constexpr int kMaxLabelledWalls = 16;
@@ -85,6 +87,11 @@ struct Criteria {
                                         // below it
   int flat_alternations = 1;            // without intersect_flat: closest points taken when
                                         // alternating towards a flat, 1..20
+  // Rule R5: no other sample point is nearer to the centre of a simplex than its circumradius and
+  // this share of epsilon; in [0, 0.1] for k <= 2, in [0, 0.05] for k = 3. 0: no such rule. A mesh
+  // where that is not reached is what it is, and its certificate says so. Closed manifolds of one
+  // size only.
+  double protection = 0;
 };
 
 // How much a certificate asks of the oracle.

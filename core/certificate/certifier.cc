@@ -12,6 +12,7 @@
 #include "core/certificate/claims/complex_claims.h"
 #include "core/certificate/claims/coverage_claims.h"
 #include "core/certificate/claims/examination.h"
+#include "core/certificate/claims/protection_claims.h"
 #include "core/certificate/claims/reach_claims.h"
 #include "core/certificate/claims/region_claims.h"
 #include "core/certificate/claims/sheet_claims.h"
@@ -229,6 +230,7 @@ class WholeRounds final : public CertifierRounds {
       if (boundary_) boundary_->JudgeReach();
       claims_->closeness.JudgeDeviation();
       claims_->reach.JudgeDeclared();
+      JudgeProtection(x_);
     }
     x_.findings.Conclude(x_.mesh.k, x_.spec, x_.certificate);
   }

@@ -9,6 +9,7 @@
 #include "core/certificate/clear_points.h"
 #include "core/label_table.h"
 #include "core/report.h"
+#include "core/specification.h"
 
 namespace stellate::core {
 
@@ -64,6 +65,8 @@ struct StarFacts {
   bool covers_box = false;      // every component of M in the bounding box is met, if the declared
                                 // reach is true
   double tangent_error_length = 0;  // sin(tangent_error) times the reach (TangentFinder), length
+  double protection = 0;            // R5's bound, length; 0: it was not asked for
+  CentreRule centre_rule = CentreRule::kTangentSpace;  // where stars judge simplices
 };
 
 // Points of M, d each, and the walls that each is on.

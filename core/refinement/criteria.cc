@@ -18,6 +18,8 @@ constexpr double kDefaultSliverBound[kMaxDimension + 1] = {0, 0, 0, 0.2, 0.15, 0
 // more vertices.
 constexpr double kFatter = 0.25;
 constexpr int kCandidates = 10, kCandidatesForFatter = 40;
+// Of fewer candidates too often none is outside of all shells.
+constexpr int kCandidatesForProtection = 30;
 
 // The least dihedral angles of tetrahedra in manifolds with walls: in solids, whose inner points
 // need no query, and in others. The rule costs solids 5 % more vertices, and T^3 cut by a
@@ -53,9 +55,11 @@ ResolvedCriteria Resolve(const Specification& spec) {
   }
   r.picking_radius = c.picking_radius;
   r.small_sliver_radius = c.small_sliver_radius;
-  r.candidates = c.candidates.value_or(spec.dimension <= 2              ? 1
-                                       : r.shape.sliver_bound > kFatter ? kCandidatesForFatter
-                                                                        : kCandidates);
+  r.shape.protection = c.protection * r.epsilon;
+  r.candidates = c.candidates.value_or(r.shape.sliver_bound > kFatter ? kCandidatesForFatter
+                                       : c.protection > 0             ? kCandidatesForProtection
+                                       : spec.dimension <= 2          ? 1
+                                                                      : kCandidates);
   r.flat_alternations = c.flat_alternations;
   r.speculative = c.speculative;
   r.size_rate = c.size_rate.value_or(INFINITY);

@@ -51,7 +51,8 @@ Engine<K>::Engine(const Specification& spec, const ResolvedCriteria& criteria)
       stars_(spec.ambient_dimension, criteria.epsilon, {criteria.inradius, criteria.centre_rule},
              LabelTable(spec.labels, Closures(spec.closures))),
       sizes_(criteria),
-      boundary_(spec.walls, Closures(spec.closures), spec.boundary_only) {
+      boundary_(spec.walls, Closures(spec.closures), spec.boundary_only),
+      protection_(criteria.shape.protection) {
   // Sizes are estimated from whole stars.
   if (boundary_.has_walls() && !sizes_.is_estimated()) stars_.RestrictToBoundary();
 }
@@ -63,6 +64,8 @@ Engine<K> Engine<K>::ForSpeculation(double share) const {
   speculation.asks_flats_ = true;
   speculation.violations_.ForgetFlats();
   speculation.filled_ = {};
+  speculation.criteria_.shape.protection = 0;  // true points only can be protected
+  speculation.protection_ = {};
   if (share < 1) {
     speculation.criteria_.epsilon *= share;
     speculation.sizes_ = SizeField<K>(speculation.criteria_);
@@ -184,6 +187,17 @@ std::vector<Target<K>> Engine<K>::GoodPointTargets() {
 }
 
 template <int K>
+std::vector<Target<K>> Engine<K>::ProtectionTargets() {
+  std::vector<Target<K>> targets;
+  for (const auto& [star, violation] : protection_.Judge(stars_)) {
+    CheckInterruption(targets.size());
+    if (!violations_.is_given_up(star)) targets.push_back(TargetOf(star, violation));
+  }
+  if (protection_.is_given_up()) criteria_.shape.protection = 0;
+  return targets;
+}
+
+template <int K>
 bool Engine<K>::HasGrownTooMuch() const {
   if (violations_.are_all_dirty()) return false;
   const double most = std::max(kMostGrowth * static_cast<double>(before_good_points_),
@@ -211,6 +225,7 @@ std::optional<std::vector<Target<K>>> Engine<K>::Plan() {
     targets = SizeAndShapeTargets();
   }
   if (targets.empty()) targets = GoodPointTargets();
+  if (targets.empty() && protection_.is_asked() && AllRulesHold()) targets = ProtectionTargets();
   if (!boundary_.has_walls()) return targets;
   const bool any = !targets.empty();
   FaceSplits<K>(parts()).Yield(&targets);
@@ -287,6 +302,7 @@ typename Engine<K>::Change Engine<K>::Commit() {
   std::iota(touched.end() - (stars_.size() - first), touched.end(), first);
   if (sizes_.is_estimated()) sizes_.Look(stars_, touched);
   violations_.Update(stars_.size(), touched, JudgeSizeAndShape(touched));
+  if (protection_.is_asked()) protection_.Note(stars_, touched, first);
   if (judged) {
     violations_.MarkDirty(around);
     violations_.MarkDirty(touched);

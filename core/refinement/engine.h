@@ -13,6 +13,7 @@
 #include "core/refinement/engine_parts.h"
 #include "core/refinement/filled_mesh.h"
 #include "core/refinement/inserter.h"
+#include "core/refinement/protection.h"
 #include "core/refinement/size_field.h"
 #include "core/refinement/violation_index.h"
 #include "core/report.h"
@@ -46,10 +47,12 @@ class Engine {
   // Returns the violations to fix next, those of the first rules that any star breaks. Empty:
   // nothing more can be done, see AllRulesHold. Nothing: points are inserted without end.
   std::optional<std::vector<Target<K>>> Plan();
-  // The parts of Plan: targets of R1 and R2; if there are none, those of R3 and R4.
+  // The parts of Plan: targets of R1 and R2; if there are none, those of R3 and R4; if all these
+  // rules hold, those of R5.
   std::vector<Target<K>> SizeAndShapeTargets() const;
   std::vector<Target<K>> GoodPointTargets();
-  // After a Plan that found no targets.
+  std::vector<Target<K>> ProtectionTargets();
+  // After a Plan that found no targets: whether R1 to R4 hold.
   bool AllRulesHold() const;
   std::vector<Target<K>> Select(const std::vector<Target<K>>& targets) const;
   CandidateSet<K> Draw(std::vector<Target<K>> targets, std::uint64_t round) const;
@@ -98,6 +101,7 @@ class Engine {
   const ViolationIndex<K>& violations() const { return violations_; }
   BoundaryState<K>& boundary() { return boundary_; }
   const BoundaryState<K>& boundary() const { return boundary_; }
+  const Protection<K>& protection() const { return protection_; }
   FilledMesh<K>& filled() { return filled_; }
   const FilledMesh<K>& filled() const { return filled_; }
 
@@ -121,6 +125,7 @@ class Engine {
   ViolationIndex<K> violations_;
   BoundaryState<K> boundary_;
   FilledMesh<K> filled_;
+  Protection<K> protection_;
   std::uint64_t before_good_points_ = 0;  // vertices when R1 and R2 first held
 };
 

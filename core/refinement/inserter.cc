@@ -8,6 +8,7 @@
 #include "core/base/vector_ops.h"
 #include "core/boundary/inactive_faces.h"
 #include "core/rules/count_bad.h"
+#include "core/rules/r5_protection.h"
 
 namespace stellate::core {
 namespace {
@@ -157,9 +158,10 @@ int Inserter<K>::BestCandidate(std::size_t i) const {
   const Target<K>& t = candidates_.targets[i];
   const Stars<K>& stars = to_.stars;
   thread_local typename Stars<K>::Tentative tentative;
-  int best = -1, fewest = std::numeric_limits<int>::max();
+  const double delta = to_.criteria.shape.protection;
+  int best = -1, fewest = std::numeric_limits<int>::max() / 2;
   const Eigen::Index first = candidates_.first[i];
-  for (Eigen::Index c = first; c < candidates_.first[i + 1] && fewest > 0; ++c) {
+  for (Eigen::Index c = first; c < candidates_.first[i + 1] && (fewest > 0 || delta > 0); ++c) {
     if (!answers_.found[static_cast<std::size_t>(c)]) continue;
     const double* y = answers_.points.col(c).data();
     if (!stars.CutsVertex(VertexOf(t), y) ||
@@ -170,9 +172,14 @@ int Inserter<K>::BestCandidate(std::size_t i) const {
     if (to_.criteria.candidates == 1) return index;
     stars.TryPoint(y, answers_.tangents.col(c).data(), t.star, &tentative, WallsOf(c),
                    ConormalsOf(c), answers_.SignsOf(c));
-    const int bad = CountBad<K>(stars, y, tentative, to_.criteria.shape,
-                                to_.criteria.small_sliver_radius * t.radius, fewest, WallsOf(c),
-                                answers_.SignsOf(c));
+    const Site guest{
+        stars.size(),       y, answers_.tangents.col(c).data(), WallsOf(c), ConormalsOf(c),
+        answers_.SignsOf(c)};
+    // Of points that leave no simplex unprotected, one that resolves more is better.
+    const int resolved = delta > 0 ? CountResolved<K>(stars, guest, tentative, delta) : 0;
+    const int bad = CountBad<K>(stars, guest, tentative, to_.criteria.shape,
+                                to_.criteria.small_sliver_radius * t.radius, fewest + resolved) -
+                    resolved;
     if (bad < fewest) {
       fewest = bad;
       best = index;

@@ -7,6 +7,7 @@
 #include "core/base/instantiate.h"
 #include "core/boundary/sharp_dihedrals.h"
 #include "core/complex/consistency.h"
+#include "core/rules/r5_protection.h"
 
 namespace stellate::core {
 
@@ -74,13 +75,15 @@ class StarsWithGuest {
 }  // namespace
 
 template <int K>
-int CountBad(const Stars<K>& stars, const double* point,
+int CountBad(const Stars<K>& stars, const Site& guest,
              const typename Stars<K>::Tentative& tentative, const ShapeBounds& bounds,
-             double small_radius, int enough, WallSet walls, WallSet signs) {
+             double small_radius, int enough) {
   using Cell = RestrictedVoronoiCell<K>;
   using Simplex = typename Stars<K>::Simplex;
-  const std::uint32_t id = stars.size();
-  const StarsWithGuest<K> with(stars, tentative, walls, signs);
+  const std::uint32_t id = guest.id;
+  const double* const point = guest.point;
+  const WallSet walls = guest.walls;
+  const StarsWithGuest<K> with(stars, tentative, walls, guest.signs);
   int bad = 0;
   // Whether the dual of v is no simplex of a face yet, a foreign one, or one about which stars
   // disagree.
@@ -144,12 +147,14 @@ int CountBad(const Stars<K>& stars, const double* point,
       });
     }
   }
+  if (bounds.protection > 0 && bad < enough)
+    bad += CountUnprotected<K>(stars, guest, tentative, bounds.protection, enough - bad);
   return bad;
 }
 
-#define STELLATE_EACH(K)                                                            \
-  template int CountBad(const Stars<K>&, const double*, const Stars<K>::Tentative&, \
-                        const ShapeBounds&, double, int, WallSet, WallSet);
+#define STELLATE_EACH(K)                                                          \
+  template int CountBad(const Stars<K>&, const Site&, const Stars<K>::Tentative&, \
+                        const ShapeBounds&, double, int);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH
 

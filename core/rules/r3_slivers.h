@@ -16,7 +16,7 @@ namespace stellate::core {
 // A simplex is tested in the star of its lowest vertex: if it is not there, it is inconsistent
 // anyway.
 
-// The bounds of R3 on the shape of a simplex.
+// The bounds of R3 on the shape of a simplex, and that of R5.
 struct ShapeBounds {
   double sliver_bound = 0;  // Theta0; 0: none
   // The declared reach, length: no simplex may be tilted so far from a vertex's tangent space that
@@ -26,6 +26,8 @@ struct ShapeBounds {
   double sharpest_cosine = 1;
   // Any angle is allowed, too, where the circumradius is below this share of the size bound.
   double sharp_radius = 0;
+  // R5: the least gap of a simplex, length (core/rules/r5_protection.h). 0: any.
+  double protection = 0;
 };
 
 // Whether p is the lowest vertex of the simplex dual to vertex v of p's cell.

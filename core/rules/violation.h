@@ -11,8 +11,8 @@
 
 namespace stellate::core {
 
-// The refinement rules of Sec. 5.3.5, in their order.
-enum class Rule : std::uint8_t { kSize = 0, kRadiusEdge, kShape, kInconsistent };
+// The refinement rules of Sec. 5.3.5, in their order, and R5, that of Chapter 8.
+enum class Rule : std::uint8_t { kSize = 0, kRadiusEdge, kShape, kInconsistent, kProtection };
 
 // A simplex of star(p) that breaks a rule, or that must be split to protect its face;
 // given by its dual vertex in p's cell.

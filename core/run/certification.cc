@@ -62,6 +62,8 @@ StarFacts FactsOf(Engine<K>& engine) {
   const Stars<K>& stars = engine.stars();
   StarFacts facts;
   facts.converged = true;
+  facts.protection = engine.protection().delta();
+  facts.centre_rule = engine.criteria().centre_rule;
   const bool agreed = engine.filled().is_handed_out();
   const bool leaves_inside = engine.boundary().leaves_inside();
   const bool has_labels = !stars.sample().sectors().labels().empty();

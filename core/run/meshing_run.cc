@@ -155,6 +155,7 @@ void MeshingRun<K>::Update() {
     progress_.simplices = spec_.boundary_only ? boundary_.size() : engine.simplex_count();
     progress_.bad_sliver = engine.violations().slivers();
     progress_.bad_inconsistent = engine.violations().inconsistent();
+    progress_.bad_protection = engine.protection().weak();
     if (report_.termination == Termination::kConverged) progress_.fraction = 1;
   }
   report_.counts.vertices = progress_.vertices;

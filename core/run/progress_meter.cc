@@ -38,6 +38,7 @@ void CountAll(const Engine<K>& engine, Progress* progress) {
   }
   progress->bad_sliver = violations.slivers();
   progress->bad_inconsistent = violations.inconsistent();
+  progress->bad_protection = engine.protection().weak();
 }
 
 }  // namespace
@@ -96,8 +97,8 @@ template <int K>
 ProgressMeter::Left ProgressMeter::LeftToRefine(const Engine<K>& engine) {
   const ViolationIndex<K>& violations = engine.violations();
   const double have = static_cast<double>(engine.stars().size());
-  const double broken =
-      static_cast<double>(violations.size_and_shape().size() + violations.violating());
+  const double broken = static_cast<double>(violations.size_and_shape().size() +
+                                            violations.violating() + engine.protection().weak());
   const bool judges_all = !violations.are_all_dirty();
   if (judges_all != judged_all_) seen_.clear();
   judged_all_ = judges_all;

@@ -144,6 +144,7 @@ void Scheduler<K>::InsertCandidates() {
   counts_.inserted_radius_edge += count(Rule::kRadiusEdge);
   counts_.inserted_sliver += count(Rule::kShape);
   counts_.inserted_inconsistent += count(Rule::kInconsistent);
+  counts_.inserted_protection += count(Rule::kProtection);
   counts_.duplicates += inserted.duplicates;
   if (inserted.front_moved) {
     watches_.stall.NoteFrontMoved();

@@ -65,6 +65,7 @@ Specification CoarserThan(Specification spec, double epsilon) {
   spec.declared_reach.reset();
   spec.criteria.radius_edge_bound = INFINITY;
   spec.criteria.centre_rule = CentreRule::kTangentSpace;
+  spec.criteria.protection = 0;
   if (auto& step = spec.criteria.advance_step) step = std::max(*step, epsilon);
   return spec;
 }

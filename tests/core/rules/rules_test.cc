@@ -281,13 +281,14 @@ void ExpectBadCountedRightly(const std::string& name, double epsilon) {
   for (std::uint32_t c = 0; c < candidates.size(); ++c) {
     const double* point = candidates.Point(c);
     stars->TryPoint(point, candidates.Tangent(c), Stars<K>::kNone, &tentative);
-    const int count = CountBad<K>(*stars, point, tentative, {}, epsilon, 1'000'000);
+    const Site guest{stars->size(), point, candidates.Tangent(c)};
+    const int count = CountBad<K>(*stars, guest, tentative, {}, epsilon, 1'000'000);
     for (const int enough : {0, 1, 2})
-      EXPECT_EQ(CountBad<K>(*stars, point, tentative, {}, epsilon, enough),
+      EXPECT_EQ(CountBad<K>(*stars, guest, tentative, {}, epsilon, enough),
                 std::min(count, enough));
     // A bound that every new simplex fails counts no fewer.
     const ShapeBounds thick{K >= 2 ? 0.3 : 0};
-    EXPECT_GE(CountBad<K>(*stars, point, tentative, thick, epsilon, 1'000'000), count);
+    EXPECT_GE(CountBad<K>(*stars, guest, tentative, thick, epsilon, 1'000'000), count);
 
     FramedPoints grown = mesh;
     grown.points.insert(grown.points.end(), point, point + mesh.d);

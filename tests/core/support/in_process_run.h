@@ -71,7 +71,8 @@ inline ::testing::AssertionResult SameMesh(const Mesher& a, const Mesher& b) {
       x.queries != y.queries || x.tangent_queries != y.tangent_queries ||
       x.inserted_size != y.inserted_size || x.inserted_radius_edge != y.inserted_radius_edge ||
       x.inserted_sliver != y.inserted_sliver ||
-      x.inserted_inconsistent != y.inserted_inconsistent || x.duplicates != y.duplicates)
+      x.inserted_inconsistent != y.inserted_inconsistent ||
+      x.inserted_protection != y.inserted_protection || x.duplicates != y.duplicates)
     return ::testing::AssertionFailure() << "the runs differ";
   return ::testing::AssertionSuccess();
 }
