@@ -43,6 +43,8 @@ constexpr MeshSetting kCriteria[] = {
      "estimated"},
     {"--max-deviation", &O::max_deviation,
      "circumcentres at most so far from the manifold, a length"},
+    {"--protection", &O::protection,
+     "rule R5: other vertices stay off each simplex's ball by this share of epsilon, at most 0.1"},
     {"--common-centre,!--no-common-centre", &O::common_centre,
      "judge a simplex at one centre for all its vertices"},
 };

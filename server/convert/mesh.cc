@@ -31,6 +31,7 @@ void ToProto(const core::Counts& counts, v1::Counts* out) {
   out->set_inserted_radius_edge(counts.inserted_radius_edge);
   out->set_inserted_sliver(counts.inserted_sliver);
   out->set_inserted_inconsistent(counts.inserted_inconsistent);
+  out->set_inserted_protection(counts.inserted_protection);
   out->set_duplicates(counts.duplicates);
 }
 
@@ -105,6 +106,19 @@ void BoundaryToProto(const core::Certificate& c, v1::Certificate* out) {
   out->mutable_sharpest()->mutable_point()->Add(c.sharpest->point.begin(), c.sharpest->point.end());
 }
 
+void ToProto(const core::ProtectionReport& p, v1::Protection* out) {
+  out->set_asked(p.asked);
+  out->set_least(p.least);
+  out->set_percentile(p.percentile);
+  out->set_median(p.median);
+  out->set_least_ratio(p.least_ratio);
+  out->set_weak(p.weak);
+  out->mutable_worst()->Add(p.worst.begin(), p.worst.end());
+  out->set_stability_radius(p.stability_radius);
+  out->set_thickness_bound(p.thickness_bound);
+  out->set_is_delaunay(p.is_delaunay);
+}
+
 void ToProto(const core::Certificate& c, int k, v1::Certificate* out) {
   out->set_certified(c.certified);
   out->set_verdict(c.verdict);
@@ -137,6 +151,7 @@ void ToProto(const core::Certificate& c, int k, v1::Certificate* out) {
   out->set_only_too_coarse(c.only_too_coarse);
   ToProto(c.violations, k, out);
   BoundaryToProto(c, out);
+  if (c.protection) ToProto(*c.protection, out->mutable_protection());
 }
 
 }  // namespace
@@ -206,6 +221,7 @@ void ToProto(const core::Progress& p, v1::Progress* out) {
   out->set_bad_radius_edge(p.bad_radius_edge);
   out->set_bad_sliver(p.bad_sliver);
   out->set_bad_inconsistent(p.bad_inconsistent);
+  out->set_bad_protection(p.bad_protection);
   out->set_fraction(p.fraction);
 }
 

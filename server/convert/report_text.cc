@@ -172,10 +172,29 @@ void AddPoints(const v1::ReconstructionReport& r, Entries* entries) {
 }
 
 void AddRefinement(const v1::Counts& n, Entries* entries) {
+  const std::string protection =
+      n.inserted_protection() > 0 ? Message(", protection ", Grouped(n.inserted_protection())) : "";
   entries->Add("inserted for", Message("size ", Grouped(n.inserted_size()), ", radius-edge ",
                                        Grouped(n.inserted_radius_edge()), ", slivers ",
                                        Grouped(n.inserted_sliver()), ", inconsistencies ",
-                                       Grouped(n.inserted_inconsistent())));
+                                       Grouped(n.inserted_inconsistent()), protection));
+}
+
+void AddProtection(const v1::Protection& p, Entries* entries) {
+  const std::string reached = p.weak() == 0 ? "reached"
+                                            : Message("not reached by ", Grouped(p.weak()),
+                                                      p.weak() == 1 ? " simplex" : " simplices");
+  entries->Add("protection", Message(Digits(p.asked(), 3), " asked, ", reached, ": gaps from ",
+                                     Digits(p.least(), 3), ", ", Digits(p.percentile(), 3),
+                                     " or more of 99 %, median ", Digits(p.median(), 3)));
+  const std::string stable = p.stability_radius() > 0
+                                 ? Message("no simplex changes while vertices move by less than ",
+                                           Digits(p.stability_radius(), 3), ", ")
+                                 : std::string();
+  entries->Add(
+      "stability",
+      Message(stable, "thickness at least ", Digits(p.thickness_bound(), 3),
+              p.is_delaunay() ? "; intrinsic, restricted and tangential Delaunay: proved" : ""));
 }
 
 // ", Betti numbers 1 0 0 0"
@@ -234,6 +253,7 @@ std::string ReportText(const v1::Report& report) {
     AddTopology(c, report.has_reconstruction(), &entries);
     AddMeasures(c, report.has_reconstruction(), &entries);
     AddRegions(c, &entries);
+    if (c.has_protection()) AddProtection(c.protection(), &entries);
   }
   for (const std::string& warning : c.warnings()) entries.Add("warning", warning);
   return entries.Take();

@@ -130,6 +130,7 @@ Status ReadCriteria(const v1::MeshSpec& spec, core::Specification* out) {
   to.speculative = c.speculative();
   if (c.has_size_rate()) to.size_rate = c.size_rate();
   if (c.has_max_deviation()) to.max_deviation = c.max_deviation();
+  to.protection = c.protection();
   if (c.has_common_centre()) {
     to.centre_rule =
         c.common_centre() ? core::CentreRule::kCommonCentre : core::CentreRule::kTangentSpace;
@@ -334,6 +335,7 @@ void ToProto(const core::Specification& spec, v1::MeshSpec* out) {
   criteria->set_speculative(spec.criteria.speculative);
   if (spec.criteria.size_rate) criteria->set_size_rate(*spec.criteria.size_rate);
   if (spec.criteria.max_deviation) criteria->set_max_deviation(*spec.criteria.max_deviation);
+  if (spec.criteria.protection != 0) criteria->set_protection(spec.criteria.protection);
   if (spec.criteria.centre_rule) {
     criteria->set_common_centre(*spec.criteria.centre_rule == core::CentreRule::kCommonCentre);
   }

@@ -45,6 +45,7 @@ void LayOutSpecification(Archive& archive, Value& spec) {
   archive.Number(criteria.speculative);
   archive.Maybe(criteria.size_rate);
   archive.Maybe(criteria.max_deviation);
+  archive.Number(criteria.protection);
   archive.Number(criteria.flat_alternations);
   archive.Number(spec.limits.max_vertices);
   archive.Number(spec.limits.max_rounds);

@@ -20,6 +20,7 @@ void LayOutProgress(Archive& archive, Value& progress) {
   archive.Number(progress.bad_radius_edge);
   archive.Number(progress.bad_sliver);
   archive.Number(progress.bad_inconsistent);
+  archive.Number(progress.bad_protection);
   archive.Number(progress.fraction);
 }
 
@@ -38,6 +39,7 @@ void LayOutReport(Archive& archive, Value& report) {
   archive.Number(counts.inserted_radius_edge);
   archive.Number(counts.inserted_sliver);
   archive.Number(counts.inserted_inconsistent);
+  archive.Number(counts.inserted_protection);
   archive.Number(counts.duplicates);
   auto& certificate = report.certificate;
   archive.Number(certificate.certified);
@@ -156,6 +158,22 @@ void LayOutReconstruction(Archive& archive, Value& counts) {
   for (auto& share : counts->looks) archive.Number(share);
 }
 
+template <typename Archive, typename Value>
+void LayOutProtection(Archive& archive, Value& protection) {
+  if (!archive.Has(protection.has_value())) return;
+  if constexpr (!std::is_const_v<Value>) protection.emplace();
+  archive.Number(protection->asked);
+  archive.Number(protection->least);
+  archive.Number(protection->percentile);
+  archive.Number(protection->median);
+  archive.Number(protection->least_ratio);
+  archive.Number(protection->weak);
+  archive.Ids(protection->worst);
+  archive.Number(protection->stability_radius);
+  archive.Number(protection->thickness_bound);
+  archive.Number(protection->is_delaunay);
+}
+
 // Where walls meet; without walls: they do not.
 template <typename Archive, typename Value>
 void LayOutSharpest(Archive& archive, Value& sharpest) {
@@ -180,6 +198,7 @@ std::string EncodeResult(const SessionResult& result, std::uint64_t parts) {
   LayOutSharpest(writer, sharpest);
   writer.Number(result.report.certificate.only_too_coarse);
   LayOutReconstruction(writer, result.report.reconstruction);
+  LayOutProtection(writer, result.report.certificate.protection);
   return writer.Take();
 }
 
@@ -204,6 +223,7 @@ std::optional<SessionResult> DecodeResult(std::string_view record, std::uint64_t
   }
   if (!reader.Complete()) reader.Number(result.report.certificate.only_too_coarse);
   if (!reader.Complete()) LayOutReconstruction(reader, result.report.reconstruction);
+  if (!reader.Complete()) LayOutProtection(reader, result.report.certificate.protection);
   if (!reader.Complete()) return std::nullopt;
   return result;
 }

@@ -63,6 +63,7 @@ std::string CountsJson(const Counts& n) {
   json.Add("inserted_radius_edge", n.inserted_radius_edge);
   json.Add("inserted_sliver", n.inserted_sliver);
   json.Add("inserted_inconsistent", n.inserted_inconsistent);
+  json.Add("inserted_protection", n.inserted_protection);
   json.Add("duplicates", n.duplicates);
   return json.Take();
 }
@@ -143,6 +144,22 @@ std::string SharpestJson(const std::optional<WallAngle>& sharpest) {
   return json.Take();
 }
 
+std::string ProtectionJson(const std::optional<Protection>& p) {
+  if (!p) return "null";
+  JsonObject json;
+  json.Add("asked", p->asked);
+  json.Add("least", p->least);
+  json.Add("percentile", p->percentile);
+  json.Add("median", p->median);
+  json.Add("least_ratio", p->least_ratio);
+  json.Add("weak", p->weak);
+  json.Raw("worst", IdsJson(p->worst));
+  json.Add("stability_radius", p->stability_radius);
+  json.Add("thickness_bound", p->thickness_bound);
+  json.Add("is_delaunay", p->is_delaunay);
+  return json.Take();
+}
+
 std::string CertificateJson(const Certificate& c) {
   JsonObject json;
   json.Add("certified", c.certified);
@@ -187,6 +204,7 @@ std::string CertificateJson(const Certificate& c) {
   json.Add("pinched_vertices", c.pinched_vertices);
   json.Add("volume", c.volume);
   json.Add("only_too_coarse", c.only_too_coarse);
+  json.Raw("protection", ProtectionJson(c.protection));
   return json.Take();
 }
 

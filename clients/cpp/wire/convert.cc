@@ -165,6 +165,7 @@ Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
   if (options.speculative) criteria.set_speculative(*options.speculative);
   if (options.size_rate) criteria.set_size_rate(*options.size_rate);
   if (options.max_deviation) criteria.set_max_deviation(*options.max_deviation);
+  if (options.protection) criteria.set_protection(*options.protection);
   if (options.common_centre) criteria.set_common_centre(*options.common_centre);
   v1::MeshLimits& limits = *spec.mutable_limits();
   if (options.max_vertices) limits.set_max_vertices(*options.max_vertices);
@@ -196,6 +197,7 @@ Progress FromProto(const v1::Progress& m) {
   p.bad_radius_edge = m.bad_radius_edge();
   p.bad_sliver = m.bad_sliver();
   p.bad_inconsistent = m.bad_inconsistent();
+  p.bad_protection = m.bad_protection();
   p.fraction = m.fraction();
   p.elapsed_seconds = m.elapsed_seconds();
   p.remaining_seconds = m.remaining_seconds();
@@ -246,6 +248,19 @@ Violations FromProto(const v1::Violations& m) {
   return v;
 }
 
+Protection FromProto(const v1::Protection& m) {
+  return {m.asked(),
+          m.least(),
+          m.percentile(),
+          m.median(),
+          m.least_ratio(),
+          m.weak(),
+          {m.worst().begin(), m.worst().end()},
+          m.stability_radius(),
+          m.thickness_bound(),
+          m.is_delaunay()};
+}
+
 }  // namespace
 
 Report ReportOf(const v1::Mesh& mesh) {
@@ -271,6 +286,7 @@ Report ReportOf(const v1::Mesh& mesh) {
               n.inserted_radius_edge(),
               n.inserted_sliver(),
               n.inserted_inconsistent(),
+              n.inserted_protection(),
               n.duplicates()};
   const v1::Certificate& c = m.certificate();
   Certificate& out = r.certificate;
@@ -334,6 +350,7 @@ Report ReportOf(const v1::Mesh& mesh) {
   out.volume = c.volume();
   out.pinched_vertices = c.pinched_vertices();
   out.only_too_coarse = c.only_too_coarse();
+  if (c.has_protection()) out.protection = FromProto(c.protection());
   return r;
 }
 

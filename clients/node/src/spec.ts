@@ -38,6 +38,7 @@ const CRITERIA = [
   "commonCentre",
   "sizeRate",
   "maxDeviation",
+  "protection",
 ] as const;
 const LIMITS = [
   "maxVertices",

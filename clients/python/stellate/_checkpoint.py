@@ -172,7 +172,9 @@ class Checkpoint:
                 about = json.loads(str(kept["about"]))
             if about["digest"] != _digest(spec):
                 raise ValueError("its digest is of another specification")
-            progress = about["progress"] and Progress(**about["progress"])
+            # Those of earlier versions lack the last rule.
+            standing: dict[str, Any] = {"bad_protection": 0, **(about["progress"] or {})}
+            progress = about["progress"] and Progress(**standing)
             report = Report.from_fields(about["report"])
             return FinishedMesh(
                 points, simplices, report, progress, about["revision"], walls, labels=labels

@@ -73,6 +73,7 @@ _CRITERIA = {
     "--speculative": "speculative",
     "--size-rate": "size_rate",
     "--max-deviation": "max_deviation",
+    "--protection": "protection",
     "--common-centre": "common_centre",
 }
 FLAGS = {**_RUN, **_SERVING, **_CRITERIA}

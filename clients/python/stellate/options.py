@@ -86,6 +86,11 @@ class SpecOptions(TypedDict, total=False):
         Optional[float],
         "circumcentres are at most so far from the manifold, a length; default: no such bound",
     ]
+    protection: Annotated[
+        Optional[float],
+        "keep other vertices off the ball of each simplex by this share of epsilon, rule R5; at most 0.1 "
+        "for k <= 2, 0.05 for k = 3; default 0: off",
+    ]
     max_vertices: Annotated[Optional[int], "stop there; default: the server's limit"]
     max_rounds: Annotated[
         Optional[int], "stop after this many round trips; default: the server's limit"

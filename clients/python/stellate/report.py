@@ -24,6 +24,7 @@ __all__ = [
     "Failure",
     "FinerEpsilon",
     "Progress",
+    "Protection",
     "ReconstructionReport",
     "Report",
     "Violations",
@@ -50,10 +51,11 @@ class Progress:
     vertices: int
     simplices: int
     unbounded_stars: int  # stars on the advancing front
-    bad_size: int  # stars with a simplex that breaks rule R1, then R2, R3, R4
+    bad_size: int  # stars with a simplex that breaks rule R1, then R2, R3, R4, R5
     bad_radius_edge: int
     bad_sliver: int
     bad_inconsistent: int
+    bad_protection: int
     fraction: float  # estimated share of the work done, 0..1
     elapsed_seconds: float
     remaining_seconds: float  # an estimate; 0 when unknown
@@ -74,10 +76,11 @@ class Counts:
     rounds: int  # round trips
     queries: int
     tangent_queries: int  # closest points spent on finding tangent bases
-    inserted_size: int  # sample points inserted by rule R1, then R2, R3, R4
+    inserted_size: int  # sample points inserted by rule R1, then R2, R3, R4, R5
     inserted_radius_edge: int
     inserted_sliver: int
     inserted_inconsistent: int
+    inserted_protection: int
     duplicates: int  # answers that fell on an existing sample point
 
 
@@ -176,6 +179,38 @@ class WallAngle:
 
 
 @dataclasses.dataclass(frozen=True)
+class Protection:
+    """How well a mesh is protected, in lengths.
+
+    The gap of a simplex is how much farther than its circumradius the nearest other vertex is from its
+    centre.
+    """
+
+    asked: float
+    least: float  # gap; below 0: a ball is not empty
+    percentile: float  # the gap that 99 % of the simplices have or exceed
+    median: float
+    least_ratio: float  # least gap over circumradius
+    weak: int  # simplices with a smaller gap than was asked for
+    worst: tuple[int, ...]  # the simplex with the least gap
+    stability_radius: float  # vertices that each move by less change no simplex
+    thickness_bound: float  # heights are at least this share of k times the longest edge
+    # If the reach is as declared: the intrinsic and the restricted Delaunay complex of the vertices, and
+    # their stars in tangent spaces, are all this mesh.
+    is_delaunay: bool
+
+    @classmethod
+    def from_fields(cls, fields: dict[str, Any]) -> Protection:
+        """Back from dataclasses.asdict(protection), or from JSON of it."""
+        plain: dict[str, Any] = {**fields, "worst": tuple(fields["worst"])}
+        return cls(**plain)
+
+    @classmethod
+    def from_wire(cls, message: pb.Protection) -> Protection:
+        return cls.from_fields({f.name: getattr(message, f.name) for f in dataclasses.fields(cls)})
+
+
+@dataclasses.dataclass(frozen=True)
 class Certificate:
     """What was computed from the finished complex. Lengths are in the units of the coordinates."""
 
@@ -221,6 +256,7 @@ class Certificate:
     # With walls, of all of M, to which regions add up; of the boundary alone what it encloses.
     volume: float = 0.0
     only_too_coarse: bool = False  # refused for its size alone: nothing seen contradicts it
+    protection: Protection | None = None  # where `protection` was asked for
 
 
 @dataclasses.dataclass(frozen=True)
@@ -340,6 +376,8 @@ class Report:
         certificate["regions"] = tuple(map(RegionCertificate.from_fields, regions))
         if certificate.get("sharpest"):
             certificate["sharpest"] = WallAngle.from_fields(certificate["sharpest"])
+        if certificate.get("protection"):
+            certificate["protection"] = Protection.from_fields(certificate["protection"])
         told = dict(fields.get("reconstruction") or {})  # checkpoints of earlier versions lack it
         finer = fields.get("finer")  # likewise
         if told:
@@ -348,7 +386,7 @@ class Report:
             "reconstruction": ReconstructionReport(**told) if told else None,
             "failure": failure and Failure(**failure),
             "finer": FinerEpsilon(**finer) if finer else None,
-            "counts": Counts(**fields["counts"]),
+            "counts": Counts(**{"inserted_protection": 0, **fields["counts"]}),
             "certificate": Certificate(**certificate),
         }
         return cls(**{**fields, **more})
@@ -458,6 +496,9 @@ def _certificate(message: pb.Certificate) -> Certificate:
         faces=faces,
         regions=regions,
         sharpest=sharpest,
+        protection=(
+            Protection.from_wire(message.protection) if message.HasField("protection") else None
+        ),
     )
 
 

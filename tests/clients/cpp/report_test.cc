@@ -59,7 +59,8 @@ TEST(ReportJson, IsThatOfAllClients) {
       R"("a \"quote\""}, "epsilon": 0.10000000000000001, "epsilon_reason": "", "counts": )"
       R"({"vertices": 1234567, "simplices": 42, "rounds": 0, "queries": 0, "tangent_queries": 0, )"
       R"("inserted_size": 0, "inserted_radius_edge": 0, "inserted_sliver": 0, )"
-      R"("inserted_inconsistent": 0, "duplicates": 0}, "certificate": {"certified": false, )"
+      R"("inserted_inconsistent": 0, "inserted_protection": 0, "duplicates": 0}, )"
+      R"("certificate": {"certified": false, )"
       R"("verdict": "3 links", "warnings": ["coarse", "dear"], "closed": false, "bad_faces": 0, )"
       R"("links_are_spheres": false, "links_decided_exactly": false, "bad_links": 3, )"
       R"("inconsistent_simplices": 0, "unembedded_stars": 0, "fibre_failures": 0, )"
@@ -71,7 +72,8 @@ TEST(ReportJson, IsThatOfAllClients) {
       R"("violations": {"faces": [[1, 2], [1, 5]], "links": [], "stars": [7], )"
       R"("inconsistent": [], "fibres": [0, 3]}, "boundary_simplices": 0, )"
       R"("boundary_components": 0, "boundary_euler_characteristic": 0, "faces": [], )"
-      R"("sharpest": null, "regions": [], "pinched_vertices": 0, "volume": 0, "only_too_coarse": false}, )"
+      R"("sharpest": null, "regions": [], "pinched_vertices": 0, "volume": 0, "only_too_coarse": false, )"
+      R"("protection": null}, )"
       R"("elapsed_seconds": 0.5, )"
       R"("version": "0.2.0"})");
   report.epsilon = 0;

@@ -174,7 +174,8 @@ AS_JSON = (
     '{"termination": "ORACLE_FAILED", "failure": {"reason": "ORACLE_RAISED", "message": '
     '"a \\"quote\\""}, "epsilon": 0.1, "epsilon_reason": "", "counts": {"vertices": 1234567, '
     '"simplices": 42, "rounds": 0, "queries": 0, "tangent_queries": 0, "inserted_size": 0, '
-    '"inserted_radius_edge": 0, "inserted_sliver": 0, "inserted_inconsistent": 0, "duplicates": 0}'
+    '"inserted_radius_edge": 0, "inserted_sliver": 0, "inserted_inconsistent": 0, '
+    '"inserted_protection": 0, "duplicates": 0}'
     ', "certificate": {"certified": false, "verdict": "3 links", "warnings": ["coarse", "dear"], '
     '"closed": false, "bad_faces": 0, "links_are_spheres": false, "links_decided_exactly": false, '
     '"bad_links": 3, "inconsistent_simplices": 0, "unembedded_stars": 0, "fibre_failures": 0, '
@@ -186,7 +187,7 @@ AS_JSON = (
     '"violations": {"faces": [[1, 2], [1, 5]], "links": [], "stars": [7], "inconsistent": [], '
     '"fibres": [0, 3]}, "boundary_simplices": 0, "boundary_components": 0, '
     '"boundary_euler_characteristic": 0, "faces": [], "sharpest": null, "regions": [], '
-    '"pinched_vertices": 0, "volume": 0, "only_too_coarse": false}, "elapsed_seconds": 0.5, '
+    '"pinched_vertices": 0, "volume": 0, "only_too_coarse": false, "protection": null}, "elapsed_seconds": 0.5, '
     f'"version": "{stellate.__version__}"}}'
 )
 

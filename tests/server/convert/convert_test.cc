@@ -86,6 +86,21 @@ TEST(ConvertSpec, RoundTrip) {
   EXPECT_EQ(back.limits().max_batch_queries(), 4000u);
 }
 
+TEST(ConvertSpec, ProtectionComesAndGoes) {
+  v1::MeshSpec spec = GoodSpec(), back;
+  spec.mutable_criteria()->set_protection(0.1);
+  const auto request = FromProto(spec, Config{});
+  ASSERT_TRUE(request) << request.error().message;
+  EXPECT_EQ(request->spec.criteria.protection, 0.1);
+  ToProto(request->spec, &back);
+  EXPECT_EQ(back.criteria().protection(), 0.1);
+  const auto without = FromProto(GoodSpec(), Config{});
+  ASSERT_TRUE(without);
+  v1::MeshSpec plain;
+  ToProto(without->spec, &plain);
+  EXPECT_FALSE(plain.criteria().has_protection());
+}
+
 TEST(ConvertSpec, LabelsAreBytesOfSignVectors) {
   v1::MeshSpec spec = GoodSpec();
   spec.set_walls(2);

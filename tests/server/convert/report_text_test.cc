@@ -121,6 +121,29 @@ TEST(ReportText, FoldsLongLinesUnderTheirWords) {
   EXPECT_GE(folded, 3);
 }
 
+TEST(ReportText, SaysHowWellAMeshIsProtected) {
+  v1::Report report = Good();
+  EXPECT_FALSE(Says(ReportText(report), "protection"));
+  report.mutable_counts()->set_inserted_protection(7);
+  v1::Protection& p = *report.mutable_certificate()->mutable_protection();
+  p.set_asked(0.01);
+  p.set_least(0.0101);
+  p.set_percentile(0.02);
+  p.set_median(0.06);
+  p.set_stability_radius(0.0005);
+  p.set_thickness_bound(0.009);
+  std::string text = ReportText(report);
+  EXPECT_TRUE(Says(text, ", protection 7")) << text;
+  EXPECT_TRUE(Says(text, "protection  0.01 asked, reached: gaps from 0.0101")) << text;
+  EXPECT_TRUE(Says(text, "vertices move by less than 0.0005")) << text;
+  EXPECT_FALSE(Says(text, "intrinsic")) << text;
+  p.set_is_delaunay(true);
+  p.set_weak(1);
+  text = ReportText(report);
+  EXPECT_TRUE(Says(text, "not reached by 1 simplex:")) << text;
+  EXPECT_TRUE(Says(text, "intrinsic, restricted and tangential")) << text;
+}
+
 // What a worker or an oracle says can neither command a terminal nor pass for another entry.
 TEST(ReportText, ShowsNoCommandOfStrangers) {
   v1::Report report = Good();

@@ -88,6 +88,26 @@ TEST(ResultRecord, KeepsWhatBecameOfPoints) {
   EXPECT_EQ(back.unfilled_vertices, 3u);
 }
 
+TEST(ResultRecord, KeepsProtection) {
+  SessionResult result = Refused();
+  result.progress.bad_protection = 4;
+  result.report.counts.inserted_protection = 5;
+  result.report.certificate.protection =
+      core::ProtectionReport{1, 2, 3, 4, 5, 6, {7, 8, 9}, 10, 11, true};
+  std::uint64_t parts = 0;
+  const auto read = DecodeResult(EncodeResult(result, 2), &parts);
+  ASSERT_TRUE(read && read->report.certificate.protection);
+  EXPECT_EQ(read->progress.bad_protection, 4u);
+  EXPECT_EQ(read->report.counts.inserted_protection, 5u);
+  const core::ProtectionReport& back = *read->report.certificate.protection;
+  EXPECT_EQ((std::vector{back.asked, back.least, back.percentile, back.median, back.least_ratio,
+                         back.stability_radius, back.thickness_bound}),
+            (std::vector<double>{1, 2, 3, 4, 5, 10, 11}));
+  EXPECT_EQ(back.weak, 6u);
+  EXPECT_EQ(back.worst, (std::vector<std::uint32_t>{7, 8, 9}));
+  EXPECT_TRUE(back.is_delaunay);
+}
+
 // Those of earlier servers end before the boundary, or behind it, the past, the angle or the mark
 // of a mesh that is too coarse; what ends elsewhere is damaged.
 TEST(ResultRecord, EarlierOnesAreRead) {
@@ -107,7 +127,7 @@ TEST(ResultRecord, EarlierOnesAreRead) {
     EXPECT_EQ(read->report.certificate.violations.stars.empty(), whole.size() <= 2);
     EXPECT_EQ(read->report.certificate.only_too_coarse, whole.size() >= 5);
   }
-  ASSERT_EQ(whole.size(), 6u);
+  ASSERT_EQ(whole.size(), 7u);
   EXPECT_EQ(whole.back(), record.size());
 }
 

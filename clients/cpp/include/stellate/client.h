@@ -69,6 +69,7 @@ struct MeshOptions {
   // R_p at most this share of the local size, (0, 1]: the oracle's if it has one, else estimated.
   std::optional<double> size_rate;
   std::optional<double> max_deviation;  // circumcentres at most so far from M, a length
+  std::optional<double> protection;     // rule R5, in epsilon: at most 0.1 for k <= 2, else 0.05
   std::optional<bool> common_centre;    // test simplices at a centre common to their vertices
 
   std::optional<Seconds> worker_wait, answer_time, busy_time;  // limits of the workers

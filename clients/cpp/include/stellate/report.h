@@ -31,8 +31,9 @@ struct Progress {
   std::uint64_t queries = 0;  // queries answered
   std::uint64_t vertices = 0, simplices = 0;
   std::uint64_t unbounded_stars = 0;  // stars on the advancing front
-  // Stars with a simplex that breaks rule R1, R2, R3, R4.
+  // Stars with a simplex that breaks rule R1, R2, R3, R4, R5.
   std::uint64_t bad_size = 0, bad_radius_edge = 0, bad_sliver = 0, bad_inconsistent = 0;
+  std::uint64_t bad_protection = 0;
   double fraction = 0;           // estimated share of the work done, 0..1
   double elapsed_seconds = 0;    // since the mesh was created, while a server had it
   double remaining_seconds = 0;  // an estimate; 0 when unknown
@@ -44,8 +45,9 @@ struct Counts {
   std::uint64_t rounds = 0;  // round trips
   std::uint64_t queries = 0;
   std::uint64_t tangent_queries = 0;  // closest points spent on finding tangent bases
-  std::uint64_t inserted_size = 0;    // sample points that rule R1 inserted, then R2, R3, R4
+  std::uint64_t inserted_size = 0;    // sample points that rule R1 inserted, then R2, R3, R4, R5
   std::uint64_t inserted_radius_edge = 0, inserted_sliver = 0, inserted_inconsistent = 0;
+  std::uint64_t inserted_protection = 0;
   std::uint64_t duplicates = 0;  // answers that fell on an existing sample point
 };
 
@@ -105,6 +107,23 @@ struct WallAngle {
   std::vector<double> point;         // a vertex
 };
 
+// How well a mesh is protected, in lengths. The gap of a simplex is how much farther than its
+// circumradius the nearest other vertex is from its centre.
+struct Protection {
+  double asked = 0;
+  double least = 0;                  // gap; below 0: a ball is not empty
+  double percentile = 0;             // the gap that 99 % of the simplices have or exceed
+  double median = 0;                 // gap
+  double least_ratio = 0;            // least gap over circumradius
+  std::uint64_t weak = 0;            // simplices with a smaller gap than was asked for
+  std::vector<std::uint32_t> worst;  // the simplex with the least gap
+  double stability_radius = 0;       // vertices that each move by less change no simplex
+  double thickness_bound = 0;        // heights are at least this share of k times the longest edge
+  // If the reach is as declared: the intrinsic and the restricted Delaunay complex of the vertices,
+  // and their stars in tangent spaces, are all this mesh.
+  bool is_delaunay = false;
+};
+
 // What the server computed from the finished complex. Lengths are in the coordinates' unit.
 struct Certificate {
   bool certified = false;  // every claim holds and the run converged
@@ -158,6 +177,8 @@ struct Certificate {
   // Refused for epsilon alone: no check contradicts the mesh, which is too coarse, compared with
   // the reach, to be certified.
   bool only_too_coarse = false;
+
+  std::optional<Protection> protection;  // where MeshOptions::protection asks for it
 };
 
 // What a reconstruction found of its points. Lengths are in the coordinates' unit.
