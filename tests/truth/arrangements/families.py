@@ -363,7 +363,7 @@ def tori(k: int) -> Callable[[np.random.Generator], Case]:
         # A square, or an interval, of arcs, times circles.
         topology = {1: (1, -1 if k == 2 else 0), 2: (1, 1 if k == 2 else 0)}
         truth = Truth(values, label, 1.0, topology, {1: (whole - second, 0.0), 2: (second, 0.0)})
-        finest, coarsest = {2: (0.1, 0.4), 3: (0.4, 0.5), 4: (0.6, 0.6)}[k]
+        finest, coarsest = {2: (0.1, 0.4), 3: (0.4, 0.5), 4: (0.8, 0.8)}[k]
         return Case(oracle, truth, motion, finest, coarsest, alone=False)
 
     return make
