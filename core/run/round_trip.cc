@@ -15,7 +15,7 @@ namespace {
 // answer moves by a hundredth, as the normal there is known to a tenth.
 constexpr double kStandOff = 0.1;
 // Points planned so many epsilon apart may have any tangent space.
-constexpr double kFar = 3;
+constexpr double kFarPlanned = 3;
 
 }  // namespace
 
@@ -376,13 +376,14 @@ void RoundTrip<K>::AskForTangents() {
   const PlannedPoints& planned = candidates_.planned;
   for (Eigen::Index i = 0; i < planned.size(); ++i) {
     const bool is_far = finder_.reads_normals() && planned.spacing.size() > 0 &&
-                        planned.spacing[i] > kFar * engine_.criteria().epsilon;
+                        planned.spacing[i] > kFarPlanned * engine_.criteria().epsilon;
     add(candidates_.drawn() + i,
         planned.tangents.size() > 0 && !is_far ? planned.tangents.col(i).data() : nullptr);
   }
   if (known.empty()) return;
   of.points = answers_.points(Eigen::all, known);
   of.asked = asked_(Eigen::all, known);
+  of.may_leave_out = planned.bends.size() > 0;
   finder_.Start(std::move(of));
   if (const QueryBlock* block = finder_.Next()) {
     finds_tangents_ = true;

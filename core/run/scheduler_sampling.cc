@@ -1,6 +1,7 @@
 // How a run begins: its seeds, and the initial sample.
 
 #include <algorithm>
+#include <memory>
 #include <utility>
 
 #include "core/refinement/exchange.h"
@@ -9,6 +10,29 @@
 #include "core/sampling/seeding.h"
 
 namespace stellate::core {
+namespace {
+
+// Makes the sample again, before there is any star, with tangent spaces that all of it improved.
+template <int K>
+void RefineTangents(const Specification& spec, TangentFinder& finder, Engine<K>* engine) {
+  const Sample<K>& sample = engine->stars().sample();
+  const Eigen::Index count = sample.size();
+  if (count == 0 || engine->violations().star_count() > 0) return;
+  AnsweredPoints sampled;
+  sampled.points = Eigen::Map<const Eigen::MatrixXd>(sample.points().data(), sample.d(), count);
+  sampled.tangents = Eigen::Map<const Eigen::MatrixXd>(sample.Tangent(0), sample.d() * K, count);
+  if (const double* sizes = engine->sizes().given())
+    sampled.sizes = Eigen::Map<const Eigen::VectorXd>(sizes, count);
+  const Eigen::MatrixXd before = sampled.tangents;
+  finder.Refine(sampled.points, &sampled.tangents);
+  if (sampled.tangents == before) return;
+  // Others refer to the engine by its address.
+  std::destroy_at(engine);
+  std::construct_at(engine, spec, Resolve(spec));
+  for (Eigen::Index c = 0; c < count; ++c) engine->AddToSample(sampled, c);
+}
+
+}  // namespace
 
 template <int K>
 void Scheduler<K>::InsertSeeds() {
@@ -59,6 +83,7 @@ bool Scheduler<K>::AskForSample() {
   if (candidates.size() == 0) {
     sampling_.finished = std::move(sampling_.sampler);
     sampling_.is_done = true;
+    if (!spec_.oracle.tangent_basis) RefineTangents<K>(spec_, tangent_finder_, &engine_);
     return false;
   }
   Ask(std::move(candidates), Purpose::kSample, sampling_.sampler->asking());

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "core/base/dense.h"
@@ -26,14 +27,25 @@ constexpr double kMostBeyond = 0.3;
 // exact one of the two.
 constexpr double kTellingSteps = 10;
 // They agree if their angle is no larger than directions may be wrong by without harm (its sine).
-constexpr double kAgree = 0.03;
+constexpr double kAgreement = 0.03;
 // So many have to agree, in places that the seed chose, before one is read unseen; some more are
 // taken, since some may fail.
 constexpr std::uint64_t kComparisons = 24;
 constexpr std::ptrdiff_t kTaken = 32;
 // A normal that is turned farther from its guess (its sine) is not read: on meshes that are fine
 // enough for a certificate few are, and on a crease or an undeclared boundary most.
-constexpr double kMostTurned = 0.3;
+constexpr double kMostOffGuess = 0.3;
+
+// Estimates are wrong by about as much as slopes miss the fit, and as the fit is off what is
+// orthogonal to the normal (a sine): a few hundredths do no harm.
+constexpr double kMostOff = 0.03;
+// Where a lattice grows points lie on one side alone. It bears rough tangent spaces, which Refine
+// makes four to ten times as exact.
+constexpr double kMostOffInRing = 0.12;
+constexpr double kMostMisfitInRing = 0.06;
+// Where no more than this share of a ring has no estimate, these points are left out: the rules ask
+// for others there when there are points all around.
+constexpr double kLeftOut = 0.5;
 
 // Returns an orthonormal basis of what is orthogonal to `normal`, d x k, k = d - 1: one near to the
 // guess, if there is one.
@@ -48,7 +60,12 @@ Eigen::MatrixXd BasisAcross(Eigen::VectorXd normal, const double* guess) {
 }  // namespace
 
 TangentFinder::TangentFinder(int k, int d, double step, std::uint64_t seed, double most_error)
-    : k_(k), d_(d), step_(step), most_error_(most_error), seed_(seed) {}
+    : k_(k),
+      d_(d),
+      step_(step),
+      most_error_(most_error),
+      seed_(seed),
+      fits_(std::make_unique<TangentFits>(k, d)) {}
 
 bool TangentFinder::trusts_normals() const { return reads_normals() && agreed_ >= kComparisons; }
 
@@ -59,6 +76,7 @@ void TangentFinder::Start(Points points) {
   ok_.assign(static_cast<std::size_t>(count), 0);
   errors_.assign(static_cast<std::size_t>(count), 0);
   waiting_.clear();
+  if (estimates()) return StartEstimates();
   std::vector<Eigen::Index> open, readable;
   for (Eigen::Index i = 0; i < count; ++i) (CanRead(i) ? readable : open).push_back(i);
   if (trusts_normals()) {
@@ -77,6 +95,41 @@ void TangentFinder::Start(Points points) {
   Begin(std::move(open));
 }
 
+// Takes differences where there is no estimate to rely on.
+void TangentFinder::StartEstimates() {
+  if (reads_normals()) fits_->Look(of_.points);
+  if (trusts_normals() && of_.asked.cols() > 0)
+    ParallelFor(ok_.size(),
+                [&](std::size_t i) { ok_[i] = Estimate(static_cast<Eigen::Index>(i)); });
+  std::vector<Eigen::Index> open;
+  for (std::size_t i = 0; i < ok_.size(); ++i)
+    if (!ok_[i]) open.push_back(static_cast<Eigen::Index>(i));
+  if (of_.may_leave_out &&
+      static_cast<double>(open.size()) <= kLeftOut * static_cast<double>(ok_.size()))
+    open.clear();
+  Begin(std::move(open));
+}
+
+// Fits a tangent space to the points near by, and turns it by what the normal that its answer tells
+// is off. That is a second estimate, in one direction: where the two differ, or the points fit
+// poorly, neither is relied on.
+bool TangentFinder::Estimate(Eigen::Index point) {
+  if (!CanRead(point)) return false;
+  const double* const guess = of_.guesses[static_cast<std::size_t>(point)];
+  if (guess == nullptr) return false;
+  const Eigen::MatrixXd basis =
+      OrthonormalBasis(Eigen::Map<const Eigen::MatrixXd>(guess, d_, k_), k_);
+  const std::optional<TangentFits::Fit> fit = fits_->At(point, basis.data());
+  const bool rough = of_.may_leave_out;
+  if (!fit || fit->misfit > (rough ? kMostMisfitInRing : kMostOff)) return false;
+  const Eigen::VectorXd normal = (of_.asked.col(point) - of_.points.col(point)).normalized();
+  const Eigen::VectorXd off = fit->tangents.transpose() * normal;
+  if (off.norm() > (rough ? kMostOffInRing : kMostOff)) return false;
+  Eigen::Map<Eigen::MatrixXd>(tangents_.col(point).data(), d_, k_) =
+      OrthonormalBasis(fit->tangents - normal * off.transpose(), k_);
+  return true;
+}
+
 void TangentFinder::Begin(std::vector<Eigen::Index> open) {
   again_ = false;
   guessed_ = std::all_of(open.begin(), open.end(), [&](Eigen::Index i) {
@@ -84,7 +137,28 @@ void TangentFinder::Begin(std::vector<Eigen::Index> open) {
   });
   batch_ = open;
   open_ = std::move(open);
-  if (!open_.empty()) Ask();
+  if (!open_.empty())
+    Ask();
+  else if (waiting_.empty() && reads_normals() && estimates())
+    Remember();
+}
+
+// Keeps what was found for the fits to come.
+void TangentFinder::Remember() {
+  using enum TangentFits::Knowledge;
+  Eigen::MatrixXd normals = Eigen::MatrixXd::Zero(d_, of_.points.cols());
+  std::vector<TangentFits::Knowledge> known(ok_.size(), kNone);
+  for (Eigen::Index i = 0; i < normals.cols(); ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    if (ok_[at]) known[at] = errors_[at] > 0 ? kExact : kEstimate;
+    if (of_.asked.cols() > 0 && Length(i) >= StepAt(i))
+      normals.col(i) = (of_.asked.col(i) - of_.points.col(i)).normalized();
+  }
+  fits_->Know(of_.points, tangents_, normals, known);
+}
+
+void TangentFinder::Refine(const Eigen::MatrixXd& points, Eigen::MatrixXd* tangents) {
+  if (reads_normals() && estimates()) fits_->Refine(points, kMostOff, tangents);
 }
 
 // Whether an answer is far enough from its query, and not turned too far from its guess.
@@ -96,7 +170,7 @@ bool TangentFinder::CanRead(Eigen::Index point) const {
   if (!(length >= StepAt(point))) return false;
   if (guess == nullptr) return true;
   const Eigen::Map<const Eigen::MatrixXd> basis(guess, d_, k_);
-  return (basis.transpose() * normal).norm() <= kMostTurned * length;
+  return (basis.transpose() * normal).norm() <= kMostOffGuess * length;
 }
 
 void TangentFinder::Read(const std::vector<Eigen::Index>& points) {
@@ -117,7 +191,7 @@ void TangentFinder::Compare() {
     const double length = normal.norm();
     if (!(length >= kTellingSteps * StepAt(point))) continue;
     const Eigen::Map<const Eigen::MatrixXd> basis(tangents_.col(point).data(), d_, k_);
-    if ((basis.transpose() * normal).norm() <= kAgree * length)
+    if ((basis.transpose() * normal).norm() <= kAgreement * length)
       ++agreed_;
     else
       has_disagreed_ = true;

@@ -1,12 +1,15 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <utility>
 #include <vector>
 
 #include "core/batch.h"
+#include "core/run/tangent_fits.h"
 
 namespace stellate::core {
 
@@ -39,11 +42,16 @@ class TangentFinder {
     std::vector<double> shares{};
     // The queries with these closest points, d x n; a point itself where there was none; or empty.
     Eigen::MatrixXd asked{};
+    bool may_leave_out = false;  // the sample can do without some of them
   };
   void Start(Points points);
   // Whether queries should be asked beside M rather than on it: their answers then tell the tangent
   // spaces, too.
-  bool reads_normals() const { return d_ == k_ + 1 && !has_disagreed_; }
+  bool reads_normals() const { return (d_ == k_ + 1 || estimates()) && !has_disagreed_; }
+
+  // Improves the tangent bases of points that were found, (K rows of d) x n, once there are others
+  // all around.
+  void Refine(const Eigen::MatrixXd& points, Eigen::MatrixXd* tangents);
 
   // Returns the closest-point queries still needed, or nullptr once tangents() is complete.
   const QueryBlock* Next() const { return open_.empty() ? nullptr : &block_; }
@@ -62,6 +70,7 @@ class TangentFinder {
   double error_length() const { return error_length_; }
 
  private:
+  void StartEstimates();
   void Begin(std::vector<Eigen::Index> open);
   void Ask();
   void AskMore();
@@ -77,11 +86,15 @@ class TangentFinder {
     return (of_.asked.col(point) - of_.points.col(point)).norm();
   }
   bool trusts_normals() const;
+  bool estimates() const { return d_ > k_ + 1 && !std::isfinite(most_error_); }
+  bool Estimate(Eigen::Index point);
+  void Remember();
 
   int k_, d_;
   double step_, most_error_;
   double error_length_ = 0;
   std::uint64_t seed_;
+  std::unique_ptr<TangentFits> fits_;
   // Comparisons of normals with differences.
   std::uint64_t agreed_ = 0;
   bool has_disagreed_ = false;

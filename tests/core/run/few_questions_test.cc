@@ -53,6 +53,11 @@ INSTANTIATE_TEST_SUITE_P(Codimension1, FewQuestions,
                                            Price{"sphere:2", 0.0245, 1.6, 24},
                                            Price{"sphere:3", 0.11, 2.0, 28}));
 
+INSTANTIATE_TEST_SUITE_P(HigherCodimension, FewQuestions,
+                         ::testing::Values(Price{"clifford-torus", 0.029, 1.8, 30},
+                                           Price{"so3", 0.28, 2.5, 34},
+                                           Price{"flat-torus:3", 0.24, 2.2, 42}));
+
 // Answers that are a little wrong.
 TEST(FewQuestions, WithInexactAnswers) {
   const auto manifold = Make("torus");
@@ -90,6 +95,17 @@ TEST(FewQuestions, ForAProof) {
   ExpectGoodMesh(run, manifold->facts());
   EXPECT_EQ(run.report().certificate.level, CertificateLevel::kProved);
   EXPECT_LE(run.report().counts.tangent_queries, run.report().counts.vertices / 5);
+}
+
+// No estimate enters one: in higher codimension it takes differences.
+TEST(FewQuestions, ButNoneLessForAProofInHigherCodimension) {
+  const auto manifold = Make("clifford-torus");
+  Specification spec = ClosestPointsAlone(*manifold, 0.15);
+  spec.declared_reach = manifold->facts().reach;
+  const DrivenRun run = Drive(spec, *manifold);
+  ExpectGoodMesh(run, manifold->facts());
+  EXPECT_EQ(run.report().certificate.level, CertificateLevel::kProved);
+  EXPECT_GE(run.report().counts.tangent_queries, 4 * run.report().counts.vertices);
 }
 
 }  // namespace
