@@ -113,7 +113,6 @@ struct RegionReport {
   std::int64_t euler_characteristic = 0;
   double volume = 0;                // length^k; 0 of a boundary alone, if M does not fill space
   double min_dihedral_degrees = 0;  // the least angle between facets of a simplex; of k = 1, 0
-  std::uint64_t pinched = 0;        // vertices where it touches itself, counted once for each touch
   std::vector<std::int64_t> betti;  // over Z/2, from dimension 0 on; empty: not computed
 };
 

@@ -91,15 +91,13 @@ Status CheckBoundaryOnly(const Specification& spec) {
   if (spec.dimension < 2)
     return Invalid("boundary_only",
                    "boundary_only is set for a curve, whose boundary is points: leave it out");
-  if (!spec.closures.empty())
-    return Invalid(
-        "boundary_only",
-        "boundary_only is set together with closures: what lies between phases is meshed "
-        "with them alone; leave it out");
-  if (spec.components > 0)
+  if (spec.components > 0 && spec.dimension < spec.ambient_dimension)
     return Invalid("components",
-                   "components is set together with boundary_only, which leaves unseen what the "
-                   "boundary belongs to: leave one of them out");
+                   Message("components is set together with boundary_only, for a manifold of "
+                           "dimension ",
+                           spec.dimension, " in R^", spec.ambient_dimension,
+                           ": only where it fills space the boundary tells how many components it "
+                           "belongs to; leave one of them out"));
   return Status::Ok();
 }
 

@@ -1,6 +1,9 @@
 #include "core/certificate/findings.h"
 
 #include <algorithm>
+#include <functional>
+#include <iterator>
+#include <map>
 
 #include "core/base/message.h"
 
@@ -70,41 +73,46 @@ bool Findings::MayBeBoundary() const {
   });
 }
 
-// ", with a boundary of 2 components and Euler characteristic 0 (wall 0: ...)"
-std::string DescribeBoundary(const Certificate& certificate) {
-  if (certificate.boundary_simplices == 0) return ", without boundary: no wall cuts it";
-  const auto count = [](std::uint64_t n, const char* what) {
-    return Message(n, " ", what, n == 1 ? "" : "s");
-  };
-  std::string text =
-      Message(", with a boundary of ", count(certificate.boundary_components, "component"),
-              " and Euler characteristic ", certificate.boundary_euler_characteristic);
-  std::string faces;
-  for (const FaceReport& face : certificate.faces) {
-    std::string walls;
-    ForEachWall(face.walls, [&](int wall) { walls += Message(walls.empty() ? "" : "+", wall); });
-    faces += Message(faces.empty() ? " (" : "; ", CountWalls(face.walls) == 1 ? "wall " : "walls ",
-                     walls, ": ", count(face.components, face.dimension == 0 ? "point" : "piece"),
-                     face.dimension == 0
-                         ? std::string()
-                         : Message(" of Euler characteristic ", face.euler_characteristic));
+std::string Counted(std::uint64_t n, const char* what) {
+  return Message(n, " ", what, n == 1 ? "" : "s");
+}
+
+// "6 pieces of walls, 12 edges and 8 corners"; `k`: of M. Certificate::faces has each of them.
+std::string SumUpFaces(int k, const Certificate& certificate) {
+  std::map<int, std::uint64_t, std::greater<>>
+      pieces;  // by dimension; the same walls may meet twice
+  for (const FaceReport& face : certificate.faces) pieces[face.dimension] += face.components;
+  std::string text;
+  for (auto it = pieces.begin(); it != pieces.end(); ++it) {
+    const auto& [dimension, count] = *it;
+    text += text.empty() ? "" : std::next(it) == pieces.end() ? " and " : ", ";
+    text += dimension == k - 1
+                ? k == 1 ? Counted(count, "end") : Counted(count, "piece") + " of walls"
+            : dimension == 0 ? Counted(count, "corner")
+            : dimension == 1 ? Counted(count, "edge")
+                             : Message(Counted(count, "face"), " of dimension ", dimension);
   }
-  return text + faces + ")";
+  return text;
+}
+
+// ", with a boundary of 2 components and Euler characteristic 0 (6 pieces of walls, ...)"
+std::string DescribeBoundary(int k, const Certificate& certificate) {
+  if (certificate.boundary_simplices == 0) return ", without boundary: no wall cuts it";
+  return Message(", with a boundary of ", Counted(certificate.boundary_components, "component"),
+                 " and Euler characteristic ", certificate.boundary_euler_characteristic, " (",
+                 SumUpFaces(k, certificate), ")");
 }
 
 // ", in 2 regions (label 1: 1 component of Euler characteristic 2; ...)"; `where`: "in", or
 // "around", if it is their surfaces.
 std::string DescribeRegions(const Certificate& certificate, const char* where) {
   if (certificate.regions.empty()) return {};
-  const auto counted = [](std::uint64_t n, const char* what) {
-    return Message(n, " ", what, n == 1 ? "" : "s");
-  };
   std::string regions;
   for (const RegionReport& region : certificate.regions)
     regions += Message(regions.empty() ? "" : "; ", "label ", region.label, ": ",
-                       counted(region.components, "component"), " of Euler characteristic ",
+                       Counted(region.components, "component"), " of Euler characteristic ",
                        region.euler_characteristic);
-  return Message(", ", where, " ", counted(certificate.regions.size(), "region"), " (", regions,
+  return Message(", ", where, " ", Counted(certificate.regions.size(), "region"), " (", regions,
                  ")");
 }
 
@@ -116,7 +124,7 @@ std::string CertifiedBoundary(int k, const Certificate& certificate) {
       ", without the inside: ", certificate.components,
       certificate.components == 1 ? " component" : " components", " of dimension ", k - 1,
       " and Euler characteristic ", certificate.euler_characteristic,
-      DescribeRegions(certificate, "around"), DescribeBoundary(certificate),
+      DescribeRegions(certificate, "around"), ", of ", SumUpFaces(k, certificate),
       ". Decided on the whole mesh: ", has_regions ? "the surface of each region" : "it",
       " is closed, the links of its vertices are spheres, and neighbours agree about what is "
       "outside. Sampled: barycentres lie near their walls, and all of ",
@@ -133,7 +141,7 @@ std::string DescribeManifold(int k, bool has_boundary, const Certificate& certif
                  " manifold of dimension ", k, " with ", components,
                  components == 1 ? " component" : " components", " and Euler characteristic ",
                  certificate.euler_characteristic, DescribeRegions(certificate, "in"),
-                 has_boundary ? DescribeBoundary(certificate) : "");
+                 has_boundary ? DescribeBoundary(k, certificate) : "");
 }
 
 void Findings::Conclude(int k, const Specification& spec, Certificate& certificate) const {

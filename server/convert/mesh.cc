@@ -95,7 +95,6 @@ void BoundaryToProto(const core::Certificate& c, v1::Certificate* out) {
     one->set_euler_characteristic(region.euler_characteristic);
     one->set_volume(region.volume);
     one->set_min_dihedral_degrees(region.min_dihedral_degrees);
-    one->set_pinched(region.pinched);
     one->mutable_betti()->Add(region.betti.begin(), region.betti.end());
   }
   out->set_pinched_vertices(c.pinched_vertices);
@@ -273,6 +272,8 @@ void ToProto(const Session& session, v1::Mesh* out) {
   if (!request.points) {
     ToProto(request.spec, out->mutable_spec());
     out->mutable_spec()->mutable_oracle()->set_about(request.about);
+    out->mutable_spec()->mutable_region_names()->Add(request.region_names.begin(),
+                                                     request.region_names.end());
   }
   out->mutable_spec()->set_label(request.label);
   if (request.points) ToProto(*request.points, out->mutable_spec());
@@ -301,7 +302,7 @@ void ToProto(const Session& session, v1::Mesh* out) {
       report->mutable_failure()->set_reason(FailureReasonName(view.failure.reason));
       report->mutable_failure()->set_message(Cut(view.failure.message, kMaxFailureBytes));
     }
-    report->set_text(ReportText(*report));
+    report->set_text(ReportText(*report, request.region_names));
   }
   out->set_workers(static_cast<std::uint32_t>(view.workers));
   out->set_watchers(static_cast<std::uint32_t>(view.watchers));

@@ -204,31 +204,40 @@ std::string BettiNumbers(const google::protobuf::RepeatedField<std::int64_t>& be
   return numbers.empty() ? ", Betti numbers not computed" : ", Betti numbers" + numbers;
 }
 
-// A line for each region and each interface.
-void AddRegions(const v1::Certificate& c, Entries* entries) {
+// "2 (grain)", or the label alone where it has no name.
+std::string Named(std::uint32_t label, const std::vector<std::string>& names) {
+  const bool has_name = label > 0 && label <= names.size() && !names[label - 1].empty();
+  return has_name ? Message(label, " (", names[label - 1], ")") : std::to_string(label);
+}
+
+// A line for each region and each interface, and where they touch themselves.
+void AddRegions(const v1::Certificate& c, const std::vector<std::string>& names, Entries* entries) {
   for (const v1::RegionCertificate& region : c.regions()) {
     std::string words =
-        Message("label ", region.label(), ": ", Grouped(region.simplices()), " simplices, volume ",
-                Digits(region.volume(), 6), BettiNumbers(region.betti()));
+        Message("label ", Named(region.label(), names), ": ", Grouped(region.simplices()),
+                " simplices, volume ", Digits(region.volume(), 6), BettiNumbers(region.betti()));
     if (region.min_dihedral_degrees() > 0)
       words +=
           Message(", angles from ", Digits(region.min_dihedral_degrees(), 1, true), " degrees on");
-    if (region.pinched() > 0)
-      words += Message("; it touches itself at ", Grouped(region.pinched()), " vertices");
     entries->Add("region", words);
   }
   for (const v1::FaceCertificate& face : c.faces()) {
     if (!face.has_label_below()) continue;
-    entries->Add("interface",
-                 Message("wall ", face.walls(0), ", between ", face.label_below(), " and ",
-                         face.label_above(), ": ", Grouped(face.simplices()), " simplices, area ",
-                         Digits(face.volume(), 6), BettiNumbers(face.betti())));
+    entries->Add(
+        "interface",
+        Message("wall ", face.walls(0), ", between ", Named(face.label_below(), names), " and ",
+                Named(face.label_above(), names), ": ", Grouped(face.simplices()),
+                " simplices, area ", Digits(face.volume(), 6), BettiNumbers(face.betti())));
   }
+  if (c.pinched_vertices() > 0)
+    entries->Add("pinched", Message("at ", Grouped(c.pinched_vertices()),
+                                    " vertices, where the manifold or a "
+                                    "region touches itself in an edge or a point alone"));
 }
 
 }  // namespace
 
-std::string ReportText(const v1::Report& report) {
+std::string ReportText(const v1::Report& report, const std::vector<std::string>& names) {
   const v1::Counts& n = report.counts();
   const v1::Certificate& c = report.certificate();
   Entries entries;
@@ -252,7 +261,7 @@ std::string ReportText(const v1::Report& report) {
   if (c.components() > 0) {
     AddTopology(c, report.has_reconstruction(), &entries);
     AddMeasures(c, report.has_reconstruction(), &entries);
-    AddRegions(c, &entries);
+    AddRegions(c, names, &entries);
     if (c.has_protection()) AddProtection(c.protection(), &entries);
   }
   for (const std::string& warning : c.warnings()) entries.Add("warning", warning);

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 #include "stellate/v1/mesh.pb.h"
 
@@ -10,6 +11,6 @@ namespace stellate::server {
 // in 13 columns, lines of at most 100 bytes (unless a word is longer), folded under their words.
 // UTF-8 without control characters but '\n', whatever workers and oracles said. `report.text` is
 // ignored.
-std::string ReportText(const v1::Report& report);
+std::string ReportText(const v1::Report& report, const std::vector<std::string>& names = {});
 
 }  // namespace stellate::server

@@ -252,6 +252,27 @@ Refused ReadClosures(const v1::MeshSpec& spec, core::Specification* to) {
   return Status::Ok();
 }
 
+constexpr int kMaxRegions = 127;  // labels are bytes from 1 on
+
+Refused ReadRegionNames(const v1::MeshSpec& spec, std::vector<std::string>* names) {
+  if (spec.region_names_size() > kMaxRegions)
+    return Invalid("region_names", Message("region_names has ", spec.region_names_size(),
+                                           " names but may have ", kMaxRegions, ", one a label"));
+  for (const std::string& name : spec.region_names()) {
+    if (name.size() > kMaxLabelBytes)
+      return Invalid("region_names",
+                     Message("region_names[", names->size(), "] has ", name.size(),
+                             " bytes but may have ", kMaxLabelBytes, ": shorten it"));
+    if (name != text::Printable(name))
+      return Invalid("region_names",
+                     Message("region_names[", names->size(),
+                             "] has control characters, line breaks or bytes that are no UTF-8: "
+                             "leave them out, it is a name for people"));
+    names->push_back(name);
+  }
+  return Status::Ok();
+}
+
 }  // namespace
 
 Refused ReadCommon(const v1::Reconstruction& spec, const Config& config, MeshRequest* out) {
@@ -289,6 +310,7 @@ Allowed<MeshRequest> ReadSpec(const v1::MeshSpec& spec, const Config& config) {
                      "reconstruction is set, but a mesh of points is made by the rpc Reconstruct");
   }
   if (status.ok()) status = CheckAbout(request.about);
+  if (status.ok()) status = ReadRegionNames(spec, &request.region_names);
   if (!status.ok()) return tl::unexpected(std::move(status));
   return request;
 }

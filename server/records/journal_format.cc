@@ -165,6 +165,7 @@ std::string EncodeStart(const MeshRequest& request, SystemTime create_time) {
   writer.Bytes(request.owner);
   writer.Bytes(request.label);
   writer.Bytes(request.about);
+  writer.Strings(request.region_names);
   writer.Number(ToNumber(create_time));
   writer.Number(request.timeouts.answer_limit.count());
   writer.Number(request.timeouts.worker_wait.count());
@@ -182,6 +183,7 @@ bool DecodeStart(std::string_view record, MeshRequest* request, SystemTime* crea
   reader.Bytes(request->owner);
   reader.Bytes(request->label);
   reader.Bytes(request->about);
+  reader.Strings(request->region_names);
   reader.Number(time);
   reader.Number(answer_limit);
   reader.Number(worker_wait);

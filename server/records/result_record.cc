@@ -106,7 +106,6 @@ void LayOutBoundary(Archive& archive, Value& certificate) {
     archive.Number(region.euler_characteristic);
     archive.Number(region.volume);
     archive.Number(region.min_dihedral_degrees);
-    archive.Number(region.pinched);
     archive.Ids(region.betti);
   }
   archive.Number(certificate.pinched_vertices);

@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/specification.h"
 #include "server/oracles/dispatch.h"
@@ -11,10 +12,11 @@ namespace stellate::server {
 
 // All that a client declared of a mesh, as a journal keeps it.
 struct MeshRequest {
-  std::string name;   // "meshes/<id>"
-  std::string owner;  // empty where clients are not authenticated
-  std::string label;  // the client's
-  std::string about;  // what its oracle says of itself, printable
+  std::string name;                       // "meshes/<id>"
+  std::string owner;                      // empty where clients are not authenticated
+  std::string label;                      // the client's
+  std::string about;                      // what its oracle says of itself, printable
+  std::vector<std::string> region_names;  // of labels 1, 2, ..., printable; an empty one is none
   core::Specification spec;
   OracleTimeouts timeouts;
   // Set: the mesh is made of points, not of answers. `spec` then has its dimensions alone.

@@ -125,7 +125,6 @@ std::string RegionsJson(const std::vector<RegionCertificate>& regions) {
     json.Raw("euler_characteristic", std::to_string(region.euler_characteristic));
     json.Add("volume", region.volume);
     json.Add("min_dihedral_degrees", region.min_dihedral_degrees);
-    json.Add("pinched", region.pinched);
     json.Raw("betti", NumbersJson(region.betti));
     text += (text.empty() ? "" : ", ") + json.Take();
   }

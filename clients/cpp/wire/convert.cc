@@ -142,6 +142,7 @@ Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
   spec.set_walls(static_cast<std::uint32_t>(oracle.walls()));
   const std::vector<std::uint8_t> labels = oracle.labels();
   spec.set_labels(labels.data(), labels.size());
+  for (std::string& name : oracle.region_names()) spec.add_region_names(std::move(name));
   if (const auto box = oracle.bounding_box()) {
     // Shape [d]: a corner is one point, not a list of them.
     for (const auto& [corner, array] :
@@ -345,7 +346,6 @@ Report ReportOf(const v1::Mesh& mesh) {
                            region.euler_characteristic(),
                            region.volume(),
                            region.min_dihedral_degrees(),
-                           region.pinched(),
                            {region.betti().begin(), region.betti().end()}});
   out.volume = c.volume();
   out.pinched_vertices = c.pinched_vertices();

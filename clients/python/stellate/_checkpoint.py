@@ -177,7 +177,14 @@ class Checkpoint:
             progress = about["progress"] and Progress(**standing)
             report = Report.from_fields(about["report"])
             return FinishedMesh(
-                points, simplices, report, progress, about["revision"], walls, labels=labels
+                points,
+                simplices,
+                report,
+                progress,
+                about["revision"],
+                walls,
+                labels=labels,
+                region_names=tuple(spec.region_names),
             )
         except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
             raise InvalidArgument(

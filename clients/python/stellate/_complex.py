@@ -26,6 +26,9 @@ class Complex(Protocol):
     def labels(self) -> np.ndarray | None: ...
 
     @property
+    def region_names(self) -> tuple[str, ...]: ...
+
+    @property
     def report(self) -> Report | None: ...
 
     @property

@@ -100,7 +100,7 @@ def assemble(client: Client, info: MeshInfo, revision: int, on_part: OnPart | No
                     orientable = bits.orientable
                     told = Orientation.from_bits(bits.orientable, bits.turned, len(cells))
                     turned.append(told.flags(len(cells) if orientable else 0))
-                labels += labels_from_wire(part.cell_labels, cells)
+                labels += labels_from_wire(part.cell_labels, cells, info.boundary_only)
                 if part.HasField("places"):
                     told_codes, positions = places_from_wire(part.places, len(block), d)
                     codes.append(told_codes)
@@ -148,6 +148,7 @@ def assemble(client: Client, info: MeshInfo, revision: int, on_part: OnPart | No
         spread_labels(labels, cells),
         _places(codes, vertices),
         np.concatenate(smoothed) if sum(map(len, smoothed)) == vertices > 0 else None,
+        info.region_names,
     )
     return with_report(mesh, info.report if last else None)
 

@@ -27,7 +27,8 @@ class Following:
         self, client: Client, info: MeshInfo, on_progress: OnProgress | None, every: bool = True
     ) -> None:
         self._on_progress, self._every = on_progress, every
-        self._growth = DeltaMesh(info.dimension, info.ambient_dimension)
+        self._growth = DeltaMesh(info.dimension, info.ambient_dimension, info.boundary_only)
+        self._region_names = info.region_names
         self._watch = client.watch(info.name)
         self._watch.on_resume = self._growth.forget_pending
         self._progress: Progress | None = None
@@ -69,6 +70,7 @@ class Following:
             growth.revision,
             growth.walls(),
             labels=growth.labels(),
+            region_names=self._region_names,
         )
 
     def stop(self) -> None:
@@ -102,6 +104,7 @@ def _finished(growth: DeltaMesh, final: MeshInfo) -> FinishedMesh:
             growth.walls(),
             orientation,
             growth.labels(),
+            region_names=final.region_names,
         ),
         final.report,
     )

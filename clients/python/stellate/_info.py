@@ -33,6 +33,8 @@ class MeshInfo:
     workers: int
     watchers: int
     owner: str = ""  # told to administrators of the server alone
+    boundary_only: bool = False  # its simplices are those of the boundary, each with two labels
+    region_names: tuple[str, ...] = ()  # of the labels 1, 2, ...; "": none
 
     @property
     def over(self) -> bool:
@@ -64,6 +66,8 @@ class MeshInfo:
             workers=mesh.workers,
             watchers=mesh.watchers,
             owner=mesh.owner,
+            boundary_only=mesh.spec.boundary_only,
+            region_names=tuple(mesh.spec.region_names),
         )
 
 

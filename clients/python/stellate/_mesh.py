@@ -269,16 +269,18 @@ class Mesh:
         .msh  k <= 3, d <= 3: Gmsh's, version 2.2.
         .vtu  k <= 3. When d > 3 the points are the first three coordinates, and all of them are the
               point data "coordinates". Its field data are "epsilon", "certified" (0 or 1),
-              "verdict" and "version" (UTF-8 bytes).
+              "verdict" and "version" (UTF-8 bytes), and "groups": the groups' names, a line each.
         .vtk, as .vtu, and .avs .bdf .cgns .dat .dato .e .exo .f3grid .fem .h5m .hmf .inp .mdpa .med
         .mesh .meshb .nas .post .su2 .tec .vol .xdmf .xmf .xml, d <= 3, by meshio.
 
         Of a mesh with boundary .msh, .vtu, .vtk and .obj have its faces too, of all dimensions, after
-        its simplices: in .msh as physical groups, "inside", or "region_1" for label 1 where there are
-        several, "wall_0", ..., "walls_0_1", ...; in .obj
-        as groups of the same names; in .vtu and .vtk with the cell data "walls", the walls as bits
-        (0 inside), and .vtu's "group", .msh's number of it. Points have "walls" too. Faces between
-        regions are among them.
+        its simplices: in .msh as physical groups, "inside", or where there are several regions by
+        the region's name, "region_1" for label 1 if it has none, "wall_0", ..., "walls_0_1", ...; in
+        .obj as groups of the same names; in .vtu and .vtk with the cell data "walls", the walls as
+        bits (0 inside), and .vtu's "group", .msh's number of it. Points have "walls" too. Faces
+        between regions are among them. With labels .vtu and .vtk have "region", a simplex's label, 0
+        of faces, and "sides", of faces of dimension k - 1 the labels that they face away from and
+        face, (0, 0) of others.
 
         Surfaces are written with their triangles turned to agree where they are orientable. A file
         that was there is replaced when the new one is whole.
@@ -450,6 +452,7 @@ def with_report(mesh: Mesh, report: Report | None) -> Mesh:
         mesh.labels,
         mesh.places,
         mesh.smoothed,
+        mesh.region_names,
     )
 
 

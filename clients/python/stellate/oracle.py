@@ -52,6 +52,8 @@ class Oracle(Protocol):
       closures: sets of walls with labels, of numbers, for walls that depend on each other: each of a
         set, of three or more, is zero wherever all others of it are, as f - g, g - h and f - h are.
         A face is then asked for with all walls that are zero on it, although some follow from others.
+      region_names: a str for each of the labels 1, 2, ..., for people and for the groups of files; ""
+        where there is none. At most 128 bytes each.
       jacobian(points (n, d)) -> (n, m, d): of the equations that M is given by, if it is. Only
         stellate.check asks, to find where they lose rank.
       bounding_box: (lower (d,), upper (d,)), where to look for M, or
@@ -88,6 +90,7 @@ class CheckedOracle:
         self.walls = self._count_walls(oracle)
         self.labels = _labels(getattr(oracle, "labels", None), self.walls)
         self.closures = _closures(getattr(oracle, "closures", ()))
+        self.region_names = _names(getattr(oracle, "region_names", ()))
         self.about = _sentence(getattr(oracle, "about", ""))
         self.bounding_box = _box(getattr(oracle, "bounding_box", None))
         seeds = getattr(oracle, "seeds", None)
@@ -309,6 +312,15 @@ def _labels(labels: Any, walls: int) -> bytes:
             "labels have to be whole numbers from 0, outside of M, to 127, or -1 where no point is"
         )
     return given.astype(np.int8).tobytes()
+
+
+def _names(names: Any) -> tuple[str, ...]:
+    names = () if names is None else names
+    if isinstance(names, str) or not all(isinstance(name, str) for name in names):
+        raise InvalidArgument(
+            "region_names have to be a sequence of str, one for each label from 1 on"
+        )
+    return tuple(names)
 
 
 def _closures(closures: Any) -> tuple[tuple[int, ...], ...]:

@@ -154,7 +154,6 @@ class RegionCertificate:
     euler_characteristic: int
     volume: float = 0.0  # 0 of the boundary alone of what does not fill space
     min_dihedral_degrees: float = 0.0  # the least angle between two facets of a simplex
-    pinched: int = 0  # vertices where it touches itself, counted once for each touch
     betti: tuple[int, ...] = ()  # over Z/2, from dimension 0 on; empty: not computed
 
     @classmethod
@@ -479,7 +478,6 @@ def _certificate(message: pb.Certificate) -> Certificate:
             r.euler_characteristic,
             r.volume,
             r.min_dihedral_degrees,
-            r.pinched,
             tuple(r.betti),
         )
         for r in message.regions

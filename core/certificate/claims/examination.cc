@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 
+#include "core/base/message.h"
+#include "core/base/name_point.h"
 #include "core/base/vector_ops.h"
 #include "core/geometry/simplex.h"
 #include "core/geometry/simplex_frame.h"
@@ -24,6 +26,15 @@ double Examination::LocalSize(std::uint32_t v) const {
 
 double Examination::DistanceAllowed(double circumradius) const {
   return kDistanceShare * std::min(circumradius, spec.epsilon) + kDistanceNoise * size;
+}
+
+void Examination::ReportPinched() {
+  certificate.pinched_vertices = pinched.size();
+  if (pinched.empty()) return;
+  findings.Warn(Message(
+      "Pinched at ", pinched.size(), pinched.size() == 1 ? " vertex" : " vertices",
+      ", the first at ", NamePoint(Vertex(*pinched.begin())),
+      ": the manifold, or a region of it, touches itself there in an edge or a point alone."));
 }
 
 double Examination::Circumradius(const std::uint32_t* ids) const {

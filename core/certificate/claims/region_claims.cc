@@ -34,13 +34,7 @@ void RegionClaims::Judge() {
     region.insert(region.end(), ids, ids + width);
   }
   for (const auto& [label, simplices] : regions) JudgeRegion(label, simplices);
-  x_.certificate.pinched_vertices = x_.pinched.size();
-  if (x_.pinched.empty()) return;
-  const std::uint32_t first = *x_.pinched.begin();
-  x_.findings.Warn(Message(
-      "Pinched at ", x_.pinched.size(), x_.pinched.size() == 1 ? " vertex" : " vertices",
-      ", the first at ", NamePoint(x_.Vertex(first)),
-      ": the manifold, or a region of it, touches itself there in an edge or a point alone."));
+  x_.ReportPinched();
 }
 
 // In R^3 what is outside of a region tells its cavities (Alexander), where it does not touch
@@ -51,7 +45,7 @@ std::vector<std::int64_t> RegionClaims::BettiNumbersOf(const RegionReport& repor
   const int k = x_.mesh.k;
   const auto components = static_cast<std::int64_t>(report.components);
   if (k < 3) return BettiNumbers(k, components, report.euler_characteristic, simplices);
-  if (k > 3 || x_.mesh.d > 3 || report.pinched > 0) return {};
+  if (k > 3 || x_.mesh.d > 3 || !closed_off.copied.empty()) return {};
   const std::int64_t cavities =
       static_cast<std::int64_t>(ShapeOf(k - 1, closed_off.Boundary(k)).components) - components;
   return {components, components + cavities - report.euler_characteristic, cavities, 0};
@@ -74,7 +68,6 @@ void RegionClaims::JudgeRegion(int label, const std::vector<std::uint32_t>& simp
   const Together measured = MeasureTogether(x_.mesh, k, simplices);
   report.volume = measured.volume;
   report.min_dihedral_degrees = measured.min_dihedral_degrees;
-  report.pinched = closed_off.copied.size();
   report.betti = BettiNumbersOf(report, simplices, closed_off);
   x_.certificate.regions.push_back(report);
   const std::string name = Message("the region of label ", label);

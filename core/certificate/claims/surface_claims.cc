@@ -67,6 +67,8 @@ bool SurfaceClaims::Judge() {
   labels.erase(0);
   double together = 0;
   for (const int label : labels) together += JudgeRegion(label);
+  x_.ReportPinched();
+  JudgeComponents();
   c.volume = VolumeWithin([](const Row& row) { return row.below == 0 || row.above == 0; },
                           [](const Row& row) { return row.behind == 0; });
   if (!AreSameVolumes(together, c.volume))
@@ -83,6 +85,33 @@ bool SurfaceClaims::Judge() {
                        "refinement ended while one of its rules still applied");
   Measure();
   return true;
+}
+
+// What is outside of a connected solid has one part that is not bounded, and the boundary of each
+// of its parts is connected: so among the components of M's boundary one for each component of M
+// encloses a positive volume, and those around cavities a negative one. Where components touch each
+// other what they touch in is connected, too, and their volumes add up.
+void SurfaceClaims::JudgeComponents() {
+  if (x_.spec.components == 0 || x_.mesh.d != x_.mesh.k) return;
+  Parts parts(x_.mesh.vertices);
+  const auto is_end = [](const Row& row) { return row.below == 0 || row.above == 0; };
+  for (const Row& row : rows_)
+    for (int i = 1; is_end(row) && i < x_.mesh.k; ++i) parts.Join(row.ids[0], row.ids[i]);
+  std::set<std::size_t> roots;
+  for (const Row& row : rows_)
+    if (is_end(row)) roots.insert(parts.Root(row.ids[0]));
+  std::uint64_t components = 0;
+  for (const std::size_t root : roots)
+    components +=
+        VolumeWithin([&](const Row& row) { return is_end(row) && parts.Root(row.ids[0]) == root; },
+                     [](const Row& row) { return row.behind == 0; }) > 0;
+  if (components < static_cast<std::uint64_t>(x_.spec.components))
+    x_.findings.Refuse(
+        Findings::kComponents,
+        Message("the boundary is that of ", components,
+                components == 1 ? " component" : " components", " where ", x_.spec.components,
+                " were declared: give a seed on each, or a smaller epsilon if two came out as "
+                "one"));
 }
 
 // Where more than two simplices meet, those of one part of the region are neighbours.
@@ -133,27 +162,29 @@ std::vector<SurfaceClaims::Neighbours> SurfaceClaims::NeighboursIn(
 }
 
 // Counts the pieces of a region's surface at a vertex, by the signs: a piece goes from a sector's
-// wall to the next one around the face where two walls meet.
+// wall to the next one around a face of codimension 2, where two walls meet, or all of a closure.
 std::size_t SurfaceClaims::PiecesAt(std::uint32_t v, int label) const {
   const WallSet walls = x_.mesh.WallsOf(v);
   const LabelTable& table = *x_.mesh.table;
   std::map<std::pair<WallSet, WallSet>, std::size_t> ends;  // sector, wall
   for (const WallSet sector : SectorsAt(x_.mesh, v, label))
-    ForEachWall(walls, [&](int i) {
+    ForEachWall(table.Bounds(walls, sector), [&](int i) {
       if (table.Of(sector ^ SetOfWall(i)) != label)
         ends.emplace(std::pair(sector, SetOfWall(i)), ends.size());
     });
   Parts parts(ends.size());
   for (const auto& [end, at] : ends) {
     const auto& [sector, i] = end;
-    ForEachWall(walls & ~i, [&, sector = sector, i = i, at = at](int other) {
-      const WallSet j = SetOfWall(other);
-      // Around: the same sector's other wall, the same wall of the sector beyond it, or that
-      // sector's neighbour across.
-      const std::pair<WallSet, WallSet> next = table.Of(sector ^ j) != label ? std::pair(sector, j)
-                                               : table.Of(sector ^ i ^ j) != label
-                                                   ? std::pair(sector ^ j, i)
-                                                   : std::pair(sector ^ i ^ j, j);
+    ForEachWall(table.Bounds(walls & ~i, sector), [&, sector = sector, i = i, at = at](int other) {
+      // From sector to sector of the region around the face, each of which two of its walls bound.
+      const WallSet face = table.Close(i | SetOfWall(other));
+      std::pair<WallSet, WallSet> next(sector, SetOfWall(other));
+      for (int steps = 0; steps < 2 * CountWalls(face); ++steps) {
+        if (table.Of(next.first ^ next.second) != label) break;
+        next.first ^= next.second;
+        next.second = table.Bounds(face & ~next.second, next.first);
+        if (CountWalls(next.second) != 1) return;
+      }
       if (const auto found = ends.find(next); found != ends.end()) parts.Join(at, found->second);
     });
   }
@@ -239,6 +270,7 @@ double SurfaceClaims::JudgeRegion(int label) {
   const std::vector<Neighbours> neighbours = NeighboursIn(surface, label);
   std::vector<std::uint32_t> copied;
   const std::vector<std::uint32_t> ids = TakenApart(surface, label, neighbours, &copied);
+  x_.pinched.insert(copied.begin(), copied.end());
   const auto vertices = static_cast<std::uint32_t>(x_.mesh.vertices + copied.size());
   const Adjacency closed(SimplexList{k - 1, vertices, &ids});
   const LinkReport links = CheckLinks(closed);
@@ -273,7 +305,6 @@ double SurfaceClaims::JudgeRegion(int label) {
   report.euler_characteristic = shape.euler_characteristic;
   report.volume = volume;
   report.min_dihedral_degrees = MeasureTogether(x_.mesh, k - 1, plain).min_dihedral_degrees;
-  report.pinched = copied.size();
   report.betti = BettiNumbers(k - 1, static_cast<std::int64_t>(shape.components),
                               shape.euler_characteristic, plain);
   c.regions.push_back(report);

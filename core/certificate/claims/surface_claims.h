@@ -51,6 +51,8 @@ class SurfaceClaims {
 
   void TakeRows();
   double JudgeRegion(int label);
+  // Counts the components of M, if it fills space and their least number is declared.
+  void JudgeComponents();
   // Returns what some of the simplices enclose; 0 if M does not fill space.
   double VolumeWithin(FunctionRef<bool(const Row&)> is_of_it,
                       FunctionRef<bool(const Row&)> faces_inwards) const;

@@ -134,3 +134,21 @@ def test_mesh_describes_itself():
     assert (mesh.dimension, mesh.ambient_dimension, mesh.certified) == (2, 3, False)
     assert "k=2 d=3 84 points, 168 simplices, no report" in repr(mesh)
     assert isinstance(mesh, stellate.Mesh)
+
+
+def labelled(chunk, labels):
+    chunk.delta.added_labels = bytes(labels)
+    return chunk
+
+
+def test_the_boundary_alone_has_two_labels_a_simplex_and_plain_meshes_have_not():
+    growth = DeltaMesh(2, 3, boundary_only=True)
+    rows = [[0, 1, 2], [0, 1, 3]]
+    growth.absorb(labelled(delta(1, 0, np.ones((4, 3)), rows, []), [1, 0, 0, 2]))
+    assert growth.labels().tolist() == [[1, 0], [0, 2]]
+    for wrong in ([], [1, 2], [1, 2, 3, 4, 5, 6]):
+        with pytest.raises(ValueError, match="do not fit 2 simplices"):
+            growth = DeltaMesh(2, 3, boundary_only=True)
+            growth.absorb(labelled(delta(1, 0, np.ones((4, 3)), rows, []), wrong))
+    with pytest.raises(ValueError, match="4 labels do not fit 2 simplices"):
+        DeltaMesh(2, 3).absorb(labelled(delta(1, 0, np.ones((4, 3)), rows, []), [1, 0, 0, 2]))

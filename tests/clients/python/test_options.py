@@ -48,6 +48,7 @@ class Everything:
     dimension, ambient_dimension, walls = 2, 3, 3
     labels = [0, 1, 2, -1, -1, 1, 2, 0]
     closures = [(0, 1, 2)]
+    region_names = ["core", "shell"]
     bounding_box = [-1.0] * 3, [1.0] * 3
     seeds = np.ones((1, 3))
 

@@ -138,7 +138,7 @@ TEST_P(ArrangementsTest, AreMeshedRegionByRegion) {
     EXPECT_EQ(region.simplices, simplices.size());
     EXPECT_EQ(region.euler_characteristic, testing::EulerOf(simplices)) << region.label;
     EXPECT_NEAR(region.volume, Volume(*mesh, simplices), 1e-9 * region.volume);
-    if (arrangement.domain.k < 3 || region.pinched == 0) {
+    if (arrangement.domain.k < 3 || certificate.pinched_vertices == 0) {
       const std::vector<int> betti = testing::BettiNumbers(simplices);
       EXPECT_EQ(region.betti, std::vector<std::int64_t>(betti.begin(), betti.end()));
     }

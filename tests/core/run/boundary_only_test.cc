@@ -303,8 +303,123 @@ TEST(BoundaryOnly, IsTakenApartWhereARegionTouchesItself) {
   for (const auto& facet : stellate::testing::RimOf(mesh.Of(1)))
     for (const std::uint32_t v : facet) EXPECT_EQ(mesh.walls[v] & 6, 6u);
   ASSERT_EQ(certificate.regions.size(), 1u);
-  EXPECT_GT(certificate.regions[0].pinched, 3u);
+  EXPECT_GT(certificate.pinched_vertices, 3u);
+  ASSERT_FALSE(certificate.warnings.empty());
+  EXPECT_EQ(certificate.warnings.front().rfind("Pinched at ", 0), 0u);
   EXPECT_EQ(certificate.regions[0].components, 1u);
+}
+
+// The interfaces of three phases that meet in an edge, of four that meet in a point, and of three
+// on a torus: each region's surface is closed, and each simplex has the labels of the phases that
+// are the largest on either side of it.
+TEST(BoundaryOnly, HasTheInterfacesOfPhases) {
+  std::vector<Arrangement> all = stellate::testing::PhaseArrangements();
+  all.push_back(stellate::testing::PhasesInTorus());
+  for (const Arrangement& phases : all) {
+    for (const unsigned seed : {0u, 1u}) {
+      const Domain domain = phases.domain.Turned(seed);
+      Specification spec = phases.SpecificationFor(phases.epsilon);
+      spec.bounding_box = BoundingBox{domain.box.lower, domain.box.upper};
+      spec.random_seed = seed + 1;
+      const Boundary mesh = BoundaryOf(domain, spec);
+      const Certificate& certificate = mesh.report.certificate;
+      EXPECT_TRUE(certificate.certified) << phases.name << seed << ": " << certificate.verdict;
+      EXPECT_EQ(certificate.pinched_vertices, 0u);
+      double together = 0;
+      for (const auto& [label, euler] : phases.euler) {
+        EXPECT_TRUE(stellate::testing::RimOf(mesh.Of(label)).empty()) << phases.name << label;
+        const int sphere = domain.k == 2 ? 0 : 2;
+        EXPECT_EQ(stellate::testing::EulerOf(mesh.Of(label)), euler * sphere) << phases.name;
+        EXPECT_GT(mesh.VolumeOf(label), 0) << phases.name << label;
+        together += mesh.VolumeOf(label);
+      }
+      EXPECT_NEAR(certificate.volume, together, 1e-9 * together) << phases.name;
+      std::set<Sides> pairs;
+      for (const auto& [ids, sides] : mesh.simplices) {
+        pairs.insert(std::minmax(sides.first, sides.second));
+        WallSet on = ~WallSet{0};
+        Eigen::VectorXd middle = Eigen::VectorXd::Zero(domain.d);
+        for (const std::uint32_t v : ids) {
+          on &= mesh.walls[v];
+          middle += mesh.points.col(v) / static_cast<double>(ids.size());
+        }
+        // Of the walls that the simplex is on, one separates its labels.
+        WallSet signs = 0;
+        for (std::size_t w = 0; w < domain.walls.size(); ++w)
+          if (domain.walls[w](middle, nullptr) >= 0) signs |= SetOfWall(static_cast<int>(w));
+        bool separates = false;
+        ForEachWall(on, [&](int wall) {
+          const Sides of(phases.label(signs & ~SetOfWall(wall)),
+                         phases.label(signs | SetOfWall(wall)));
+          separates = separates ||
+                      std::minmax(of.first, of.second) == std::minmax(sides.first, sides.second);
+        });
+        if (CountWalls(on) == 1) {
+          EXPECT_TRUE(separates) << phases.name;
+        }
+      }
+      const std::size_t n = phases.euler.size();  // each two of them meet, and each ends outside
+      EXPECT_EQ(pairs.size(), n * (n - 1) / 2 + n) << phases.name;
+    }
+  }
+}
+
+TEST(BoundaryOnly, HasTheCurvesBetweenPhasesOnASurface) {
+  const Arrangement phases = stellate::testing::PhasesOnTorus();
+  const Boundary mesh = BoundaryOf(phases.domain, phases.SpecificationFor(phases.epsilon));
+  EXPECT_TRUE(mesh.report.certificate.certified) << mesh.report.certificate.verdict;
+  std::size_t triple = 0;
+  for (const WallSet walls : mesh.walls) triple += CountWalls(walls) == 3;
+  EXPECT_EQ(triple, 4u);
+  for (const int label : {1, 2, 3})
+    EXPECT_TRUE(stellate::testing::RimOf(mesh.Of(label)).empty()) << label;
+  std::set<Sides> pairs;
+  for (const auto& [ids, sides] : mesh.simplices)
+    pairs.insert(std::minmax(sides.first, sides.second));
+  EXPECT_EQ(pairs, (std::set<Sides>{{1, 2}, {1, 3}, {2, 3}}));
+}
+
+// The verdict sums up what it is made of; the certificate has each face.
+TEST(BoundaryOnly, SumsUpInTheVerdict) {
+  const Domain cube = stellate::testing::Cube();
+  const Boundary mesh = BoundaryOf(cube, cube.SpecificationFor(0.6));
+  const std::string& verdict = mesh.report.certificate.verdict;
+  EXPECT_NE(verdict.find("6 pieces of walls, 12 edges and 8 corners"), std::string::npos)
+      << verdict;
+  EXPECT_EQ(verdict.find("walls 0+"), std::string::npos) << verdict;
+}
+
+// How many components M has is known of its boundary where M fills space: two balls, of which one
+// has a void, and a ball around which there is a shell.
+TEST(BoundaryOnly, CountsComponents) {
+  Arrangement balls = stellate::testing::SpaceArrangements()[0];
+  const auto ball = [](double x, double y, double z, double radius) {
+    return stellate::testing::InBall(Eigen::Vector3d(x, y, z), radius);
+  };
+  balls.domain.walls = {ball(-1.2, 0, 0, 1), ball(-1.1, 0.05, -0.1, 0.6), ball(1.2, 0, 0, 0.7)};
+  balls.domain.box = stellate::testing::CubeOf(3, 2.4);
+  balls.label = [](WallSet s) { return s == 1 || s == 4 ? 1 : 0; };
+  Specification spec = balls.SpecificationFor(0.18);
+  spec.components = 2;
+  const Boundary two = BoundaryOf(balls.domain, spec);
+  EXPECT_TRUE(two.report.certificate.certified) << two.report.certificate.verdict;
+  EXPECT_EQ(two.report.certificate.components, 3u) << "of the boundary";
+  spec.components = 3;
+  const Boundary three = BoundaryOf(balls.domain, spec);
+  EXPECT_FALSE(three.report.certificate.certified);
+  EXPECT_NE(three.report.certificate.verdict.find("that of 2 components where 3 were declared"),
+            std::string::npos)
+      << three.report.certificate.verdict;
+  Arrangement shells = balls;
+  shells.domain.walls = {ball(0, 0, 0, 1.5), ball(0.1, 0.05, -0.1, 1.1),
+                         ball(-0.05, 0.1, 0.08, 0.6)};
+  shells.label = [](WallSet s) { return s == 1 || s == 7 ? 1 : 0; };
+  spec = shells.SpecificationFor(0.2);
+  spec.components = 2;
+  const Boundary shell = BoundaryOf(shells.domain, spec);
+  EXPECT_TRUE(shell.report.certificate.certified) << shell.report.certificate.verdict;
+  spec.components = 3;
+  EXPECT_FALSE(BoundaryOf(shells.domain, spec).report.certificate.certified);
 }
 
 // A void that no seed is near is found from beside the boundary, or the mesh refused.
@@ -360,6 +475,10 @@ TEST(BoundaryOnly, NeedsABoundary) {
   spec = stellate::testing::Ball().SpecificationFor(0.2);
   spec.boundary_only = true;
   EXPECT_TRUE(Validate(spec).ok());
+  spec.components = 1;
+  EXPECT_TRUE(Validate(spec).ok());
+  spec = stellate::testing::Hemisphere().SpecificationFor(0.2);
+  spec.boundary_only = true;
   spec.components = 1;
   EXPECT_EQ(Validate(spec).field, "components");
 }

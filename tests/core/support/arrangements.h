@@ -151,6 +151,40 @@ inline std::vector<Arrangement> PhaseArrangements() {
   return all;
 }
 
+// Three functions that are the largest in a third of space each, around an axis.
+inline std::vector<Domain::Function> ThirdsAround(int first, int second) {
+  std::vector<Domain::Function> functions;
+  for (int i = 0; i < 3; ++i) {
+    Eigen::Vector3d towards = Eigen::Vector3d::Zero();
+    towards[first] = std::cos(2.1 * i + 0.2);
+    towards[second] = std::sin(2.1 * i + 0.2);
+    functions.push_back(HalfSpaceOf(towards, 0));
+  }
+  return functions;
+}
+
+// A solid torus in three pieces around its axis, where the phases' own edge is outside of it.
+inline Arrangement PhasesInTorus() {
+  Arrangement a = PhasesOf(3, ThirdsAround(0, 1), {TorusOf(-1)});
+  a.name = "ThreePhasesInTorus";
+  a.domain.d = 3;
+  a.domain.box = CubeOf(3, 1.6);
+  a.epsilon = 0.12;
+  return a;
+}
+
+// A torus, a surface, on which three phases meet in four points and at no place end.
+inline Arrangement PhasesOnTorus() {
+  Arrangement a = PhasesOf(2, ThirdsAround(1, 2), {});
+  a.name = "ThreePhasesOnTorus";
+  a.domain.d = 3;
+  a.domain.equations = {TorusOf()};
+  a.domain.box = CubeOf(3, 1.6);
+  a.euler.clear();
+  a.epsilon = 0.08;
+  return a;
+}
+
 // sin x cos y + sin y cos z + sin z cos x, turned with the box that it is in.
 inline Domain::Function GyroidOf() {
   return [](const Eigen::VectorXd& x, Eigen::VectorXd* gradient) {

@@ -183,6 +183,42 @@ def test_materials_by_name_the_later_ones_win(server):
     assert mesh.certified and volume(mesh.region(2)) == pytest.approx(1)
 
 
+@pytest.mark.parametrize("whole", [True, False], ids=["solid", "boundary alone"])
+def test_files_have_the_names_of_materials_and_the_labels_of_cells(server, tmp_path, whole):
+    composite = s.Labels(**{"soft matrix": s.Box([-1] * 3, [1] * 3), "grain": s.Ball(0.6)})
+    mesh = stellate.mesh(composite, 0.25, boundary_only=not whole, server=server)
+    assert mesh.certified and mesh.region_names == ("soft matrix", "grain")
+    assert np.array_equal(mesh.region("grain").simplices, mesh.region(2).simplices)
+    with pytest.raises(ValueError, match="no one region named 'void'"):
+        mesh.region("void")
+    assert "label 2 (grain): " in mesh.report.text
+    mesh.save(tmp_path / "a.msh")
+    mesh.save(tmp_path / "a.vtu")
+    gmsh, vtu = meshio.read(tmp_path / "a.msh", "gmsh"), meshio.read(tmp_path / "a.vtu")
+    names = {"soft_matrix", "grain"} if whole else set()
+    assert {name for name in gmsh.field_data if not name.startswith("wall")} == names
+    if whole:
+        tag, _ = gmsh.field_data["grain"]
+        chosen = gmsh.cell_data_dict["gmsh:physical"]["tetra"] == tag
+        found = np.sort(gmsh.cells_dict["tetra"][chosen], axis=1)
+        assert {*map(tuple, found.tolist())} == {*map(tuple, mesh.region(2).simplices.tolist())}
+        regions = {kind: of.ravel() for kind, of in vtu.cell_data_dict["region"].items()}
+        assert not regions["triangle"].any() and not regions["line"].any()
+        cells = vtu.cells_dict["tetra"]
+        for label in (1, 2):
+            size = volume(stellate.Mesh(vtu.points, cells[regions["tetra"] == label]))
+            assert size == pytest.approx(volume(mesh.region(label)))
+    # Of each triangle the materials on both sides: the normal points away from the first.
+    triangles, sides = vtu.cells_dict["triangle"], vtu.cell_data_dict["sides"]["triangle"]
+    assert {*map(tuple, sides.tolist())} == {(1, 0), (1, 2) if whole else (2, 1)}
+    middles = vtu.points[triangles].mean(axis=1)
+    a, b, c = vtu.points[triangles].transpose(1, 0, 2)
+    outwards = (np.cross(b - a, c - a) * middles).sum(axis=1) > 0
+    on_grain = sides.min(axis=1) > 0
+    assert np.allclose(np.linalg.norm(middles[on_grain], axis=1), 0.6, atol=0.06)
+    assert (outwards[on_grain] == (not whole)).all() and outwards[~on_grain].all()
+
+
 def test_a_smooth_union_is_one_wall(server):
     mesh = stellate.mesh(s.blend(s.Ball(0.6), s.Ball(0.5, at=(0.8, 0, 0)), 0.2), 0.1, server=server)
     hold(mesh, 1, 1)

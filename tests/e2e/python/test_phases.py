@@ -5,7 +5,7 @@ import pytest
 import stellate
 from stellate import oracles
 from stellate import solids as s
-from topology import component_count, euler_characteristic
+from topology import component_count, euler_characteristic, is_closed
 
 
 def near_to(centre):
@@ -69,6 +69,35 @@ def test_four_phases_that_bend_in_a_disc_and_in_a_ball(server):
     flat = [near_to(c[:2]) for c in ([0.8, 0.1], [-0.3, 0.9], [-0.5, -0.6])]
     mesh = stellate.mesh(s.Phases(*flat) & s.Ball(1, at=(0, 0)), epsilon=0.15, server=server)
     hold(mesh, flat, np.pi, 1e-9)
+
+
+@pytest.mark.parametrize("what", ["disc", "ball", "torus"])
+def test_the_interfaces_of_three_phases_alone(server, what):
+    """Each phase's surface is closed, and each triangle lies between the two that are the largest."""
+    solid, epsilon, d = {
+        "disc": (s.Ball(1, at=(0, 0)), 0.1, 2),
+        "ball": (s.Ball(1), 0.2, 3),
+        "torus": (s.Torus(1, 0.4), 0.13, 3),
+    }[what]
+    centres = [np.array([np.cos(a), np.sin(a), 0.1])[:d] for a in (0.2, 2.3, 4.4)]
+    grains = [lambda x, c=c: -((x - c) ** 2).sum(axis=1) for c in centres]
+    phases = s.Phases(*grains, names=["red", "green", "blue"]) & solid
+    mesh = stellate.mesh(phases, epsilon, boundary_only=True, server=server)
+    assert mesh.certified, mesh.report
+    assert {tuple(sorted(pair)) for pair in mesh.labels.tolist()} == {
+        (0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)
+    }  # fmt: skip
+    for name in ("red", "green", "blue"):
+        surface = mesh.region(name)
+        assert is_closed(surface.simplices)
+        assert euler_characteristic(surface.simplices) == (0 if d == 2 else 2)
+        assert surface.enclosed_volume > 0
+    between = mesh.labels.min(axis=1) > 0
+    middles = mesh.points[mesh.simplices[between]].mean(axis=1)
+    heights = np.sort(np.stack([g(middles) for g in grains]), axis=0)
+    assert (heights[2] - heights[1] < 0.05).all()
+    largest = np.argsort(np.stack([g(middles) for g in grains]), axis=0)[1:] + 1
+    assert (np.sort(largest, axis=0).T == np.sort(mesh.labels[between], axis=1)).mean() > 0.95
 
 
 def test_closures_that_do_not_hold_are_refuted_by_name(server):

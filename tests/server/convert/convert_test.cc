@@ -119,6 +119,26 @@ TEST(ConvertSpec, LabelsAreBytesOfSignVectors) {
   EXPECT_TRUE(refused.error().message.starts_with("labels[1] is -128"));
 }
 
+TEST(ConvertSpec, NamesOfRegionsAreForPeople) {
+  v1::MeshSpec spec = GoodSpec();
+  spec.add_region_names("matrix");
+  spec.add_region_names("");
+  spec.add_region_names("Körner");
+  const auto request = FromProto(spec, Config{});
+  ASSERT_TRUE(request) << request.error().message;
+  EXPECT_EQ(request->region_names, (std::vector<std::string>{"matrix", "", "Körner"}));
+  const auto refused_for = [&](const std::string& name) {
+    v1::MeshSpec wrong = spec;
+    wrong.add_region_names(name);
+    const auto refused = FromProto(wrong, Config{});
+    return refused ? std::string("taken") : refused.error().message;
+  };
+  EXPECT_TRUE(refused_for("two\nlines").starts_with("region_names[3] has control characters"));
+  EXPECT_TRUE(refused_for(std::string(129, 'x')).starts_with("region_names[3] has 129 bytes"));
+  for (int i = 0; i < 125; ++i) spec.add_region_names("x");
+  EXPECT_TRUE(refused_for("y").starts_with("region_names has 129 names but may have 127"));
+}
+
 TEST(ConvertSpec, SeedsBecomeColumns) {
   v1::MeshSpec spec = GoodSpec();
   *spec.mutable_seeds() = Numbers({1, 0, 0, 0, 1, 0}, {2, 3});
@@ -343,8 +363,8 @@ TEST(ConvertMesh, DeltasKeepTheirRows) {
 
 TEST(ConvertReport, TellsOfRegionsAndOfTheSidesOfTheirWalls) {
   core::Report report;
-  report.certificate.regions = {{2, 30, 1, 1, 0.25, 12, 0, {1, 0, 0, 0}},
-                                {5, 40, 2, -1, 0.5, 9, 3, {}}};
+  report.certificate.regions = {{2, 30, 1, 1, 0.25, 12, {1, 0, 0, 0}}, {5, 40, 2, -1, 0.5, 9, {}}};
+  report.certificate.pinched_vertices = 3;
   report.certificate.faces = {{core::WallSet{3}, 1, 7, 2, 0, {0, 1}, 4, {2, 2}},
                               {core::WallSet{1}, 2, 9, 1, 1, {5, 2}, 1.5, {1, 0, 0}}};
   report.certificate.volume = 0.75;
@@ -358,7 +378,7 @@ TEST(ConvertReport, TellsOfRegionsAndOfTheSidesOfTheirWalls) {
   EXPECT_EQ(certificate.regions(1).euler_characteristic(), -1);
   EXPECT_EQ(certificate.regions(1).volume(), 0.5);
   EXPECT_EQ(certificate.regions(1).min_dihedral_degrees(), 9);
-  EXPECT_EQ(certificate.regions(1).pinched(), 3u);
+  EXPECT_EQ(certificate.pinched_vertices(), 3u);
   EXPECT_EQ(certificate.regions(0).betti_size(), 4);
   EXPECT_EQ(certificate.regions(1).betti_size(), 0);
   EXPECT_EQ(certificate.faces(1).volume(), 1.5);

@@ -74,6 +74,26 @@ TEST(ReportText, SaysThatAManifoldEnds) {
       Says(ReportText(report), "closed up to its boundary; every link a sphere or a ball "));
 }
 
+TEST(ReportText, NamesRegionsAndTellsWhereTheyTouchThemselves) {
+  v1::Report report = Good();
+  for (const std::uint32_t label : {1u, 2u}) {
+    v1::RegionCertificate* const region = report.mutable_certificate()->add_regions();
+    region->set_label(label);
+    region->set_simplices(1000 * label);
+    region->set_volume(0.5);
+  }
+  v1::FaceCertificate* const face = report.mutable_certificate()->add_faces();
+  face->add_walls(6);
+  face->set_label_below(1);
+  face->set_label_above(2);
+  report.mutable_certificate()->set_pinched_vertices(12);
+  const std::string text = ReportText(report, {"", "grain"});
+  EXPECT_TRUE(Says(text, "region  label 1: 1,000 simplices, volume 0.5"));
+  EXPECT_TRUE(Says(text, "region  label 2 (grain): 2,000 simplices, volume 0.5"));
+  EXPECT_TRUE(Says(text, "interface  wall 6, between 1 and 2 (grain): "));
+  EXPECT_TRUE(Says(text, "pinched  at 12 vertices, where the manifold or a region touches itself"));
+}
+
 TEST(ReportText, SaysWhetherItIsCertified) {
   v1::Report report = Good();
   v1::Certificate& c = *report.mutable_certificate();

@@ -45,7 +45,8 @@ TEST(ResultRecord, HoldsFacesAndWhereWallsMeetMostSharply) {
   SessionResult result = Refused();
   core::Certificate& certificate = result.report.certificate;
   certificate.faces = {{core::WallSet{5}, 1, 7, 2, -3, {0, 1}, 2.5, {2, 1}}};
-  certificate.regions = {{4, 9, 1, 1, 0.25, 12, 3, {1, 0, 0}}};
+  certificate.regions = {{4, 9, 1, 1, 0.25, 12, {1, 0, 0}}};
+  certificate.pinched_vertices = 3;
   certificate.volume = 0.25;
   certificate.sharpest = core::WallAngle{core::WallSet{5}, 27.5, Eigen::Vector3d(1, 2, 3)};
   std::uint64_t parts = 0;
@@ -58,7 +59,7 @@ TEST(ResultRecord, HoldsFacesAndWhereWallsMeetMostSharply) {
   ASSERT_EQ(read->report.certificate.regions.size(), 1u);
   EXPECT_EQ(read->report.certificate.regions[0].volume, 0.25);
   EXPECT_EQ(read->report.certificate.regions[0].min_dihedral_degrees, 12);
-  EXPECT_EQ(read->report.certificate.regions[0].pinched, 3u);
+  EXPECT_EQ(read->report.certificate.pinched_vertices, 3u);
   EXPECT_EQ(read->report.certificate.regions[0].betti, (std::vector<std::int64_t>{1, 0, 0}));
   EXPECT_EQ(read->report.certificate.volume, 0.25);
   ASSERT_TRUE(read->report.certificate.sharpest);

@@ -129,6 +129,9 @@ class Oracle {
   // is set where g_i >= 0; 0 is outside of M. All regions are meshed together, and Mesh::labels
   // says which simplex is in which. At most 16 walls may have labels. Empty: no arrangement.
   virtual std::vector<std::uint8_t> labels() const { return {}; }
+  // The names of the regions with the labels 1, 2, ..., for people and for groups in files; an
+  // empty one is none. At most 128 bytes each.
+  virtual std::vector<std::string> region_names() const { return {}; }
 
   // Where to look for M: a box, or points near M, at least one on each component.
   virtual std::optional<BoundingBox> bounding_box() const { return std::nullopt; }

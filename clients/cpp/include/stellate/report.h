@@ -96,7 +96,6 @@ struct RegionCertificate {
   std::int64_t euler_characteristic = 0;
   double volume = 0;                // 0 of the boundary alone of what does not fill space
   double min_dihedral_degrees = 0;  // the least angle between two facets of a simplex
-  std::uint64_t pinched = 0;        // vertices where it touches itself, once for each touch
   std::vector<std::int64_t> betti;  // over Z/2, from dimension 0 on; empty: not computed
 };
 

@@ -124,6 +124,7 @@ class Labels final : public Composed {
   explicit Labels(std::vector<std::pair<std::string, Solid>> materials);
 
   const std::vector<std::string>& names() const { return names_; }
+  std::vector<std::string> region_names() const override { return names_; }
   // Throws std::invalid_argument for a name that there is not.
   int LabelOf(std::string_view name) const;
 

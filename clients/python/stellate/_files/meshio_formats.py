@@ -10,7 +10,7 @@ import numpy as np
 
 from .._complex import Complex, in_space
 from ..errors import SaveError
-from .groups import Group, groups
+from .groups import Group, groups, label_data
 
 CELLS = {0: "vertex", 1: "line", 2: "triangle", 3: "tetra"}
 
@@ -81,6 +81,8 @@ def as_meshio(mesh: Complex, cells: np.ndarray, faces: bool = True) -> Any:
             "gmsh:geometrical": tags,
             "walls": [np.full(len(g.simplices), g.bits, dtype=np.uint64) for g in every],
         }
+        if mesh.labels is not None:
+            cell_data.update(label_data(every))
         names = {group.name: np.array([group.tag, group.dimension]) for group in every}
     return meshio.Mesh(
         in_space(points),

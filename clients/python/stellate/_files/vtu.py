@@ -10,7 +10,7 @@ import numpy as np
 
 from .._complex import Complex, in_space
 from .._version import __version__
-from .groups import groups
+from .groups import Group, groups, label_data
 
 _TYPES = {
     "<f8": "Float64",
@@ -40,7 +40,7 @@ def lines(mesh: Complex, cells: np.ndarray) -> Iterator[str]:
     )
     yield "<UnstructuredGrid>"
     yield "<FieldData>"
-    for name, values in field_data(mesh).items():
+    for name, values in field_data(mesh, every).items():
         yield _array(name, values, f'NumberOfTuples="{len(values)}"')
     yield "</FieldData>"
     yield f'<Piece NumberOfPoints="{n}" NumberOfCells="{sum(counts)}">'
@@ -59,22 +59,27 @@ def lines(mesh: Complex, cells: np.ndarray) -> Iterator[str]:
         if mesh.walls is not None:
             yield _array("walls", mesh.walls)
         yield "</PointData>"
-    if len(every) > 1:
+    if len(every) > 1 or mesh.labels is not None:
         bits = np.array([group.bits for group in every], dtype=np.uint64)
         tags = np.array([group.tag for group in every], dtype=np.int32)
         yield "<CellData>"
         yield _array("group", np.repeat(tags, counts))
         yield _array("walls", np.repeat(bits, counts))
+        if mesh.labels is not None:
+            for name, parts in label_data(every).items():
+                yield _array(name, np.concatenate(parts))
         yield "</CellData>"
     yield "</Piece>"
     yield "</UnstructuredGrid>"
     yield "</VTKFile>"
 
 
-def field_data(mesh: Complex) -> dict[str, np.ndarray]:
+def field_data(mesh: Complex, every: list[Group]) -> dict[str, np.ndarray]:
     """What a file says of the whole mesh. Text is UTF-8: bytes are what every reader takes."""
     report = mesh.report
     data = {"version": _text(f"stellate {__version__}")}
+    if len(every) > 1:
+        data["groups"] = _text("".join(f"{group.name}\n" for group in every))
     if report is not None:
         data["certified"] = np.array([report.certified], dtype=np.uint8)
         data["verdict"] = _text(report.certificate.verdict)

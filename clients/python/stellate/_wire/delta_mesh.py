@@ -77,20 +77,19 @@ def spread_walls(boundary: list[tuple[np.ndarray, np.ndarray]], vertices: int) -
     return walls
 
 
-def labels_from_wire(labels: bytes, rows: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+def labels_from_wire(
+    labels: bytes, rows: np.ndarray, boundary_only: bool
+) -> list[tuple[np.ndarray, np.ndarray]]:
     """What a message says of the regions of simplices: none or one pair of arrays. Of the boundary
-    alone each simplex has two labels.
+    alone each simplex has two labels, always.
 
     Raises: ValueError if there are not that many simplices.
     """
-    if not labels:
-        return []
-    of = np.frombuffer(labels, dtype=np.int8)
-    if len(of) == 2 * len(rows):
-        return [(rows, of.reshape(-1, 2))]
-    if len(of) != len(rows):
+    each = 2 if boundary_only else 1
+    if len(labels) != each * len(rows) and (labels or boundary_only):
         raise ValueError(f"{len(labels)} labels do not fit {len(rows)} simplices")
-    return [(rows, of)]
+    of = np.frombuffer(labels, dtype=np.int8)
+    return [(rows, of.reshape(-1, 2) if boundary_only else of)] if labels else []
 
 
 def spread_labels(
@@ -119,8 +118,9 @@ class DeltaMesh:
     What comes and goes is put aside, and settled for many revisions at once.
     """
 
-    def __init__(self, dimension: int, ambient_dimension: int) -> None:
-        self._k, self._d = dimension, ambient_dimension
+    def __init__(self, dimension: int, ambient_dimension: int, boundary_only: bool = False) -> None:
+        """dimension: of its simplices. boundary_only: each of them has two labels."""
+        self._k, self._d, self._boundary_only = dimension, ambient_dimension, boundary_only
         self._begin()
 
     def _begin(self) -> None:
@@ -164,7 +164,7 @@ class DeltaMesh:
                     f"a simplex has vertex {int(rows.max())} of {self._vertex_count} vertices"
                 )
         for rows, delta in zip(added, pending):
-            self._labels += labels_from_wire(delta.added_labels, rows)
+            self._labels += labels_from_wire(delta.added_labels, rows, self._boundary_only)
         self._added += [rows for rows in added if len(rows)]
         self._removed += [rows for rows in removed if len(rows)]
         self._removed_count += sum(map(len, removed))

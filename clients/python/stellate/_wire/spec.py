@@ -52,6 +52,7 @@ def mesh_spec(oracle: CheckedOracle, epsilon: float, options: Mapping[str, Any])
     spec.labels = oracle.labels
     for closure in oracle.closures:
         spec.closures.add(walls=closure)
+    spec.region_names.extend(oracle.region_names)
     if oracle.bounding_box is not None:
         lower, upper = oracle.bounding_box
         spec.bounding_box.lower.CopyFrom(to_wire(lower))

@@ -59,6 +59,7 @@ class Labels(WalledSolid):
         box = box_of(Either(tuple(solid.tree for solid in solids)), d)
         # Signs that no point has count as outside, of which nothing is seen.
         super().__init__(walls, box, labels=np.maximum(labels, 0))
+        self.region_names = self.names
 
     def label_of(self, name: str) -> int:
         """The label of a material, by its name. Raises: InvalidArgument."""

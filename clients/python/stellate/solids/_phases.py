@@ -35,6 +35,7 @@ class Phases(ByWalls):
       functions: two to six, (n, d) -> (n,), smooth near where they are the largest two.
       gradients: of the functions, (n, d) -> (n, d) each; or "autograd", "jax" or "torch", if they are
         written for one of these; or None: differences.
+      names: of the materials, for `mesh.region(name)` and the groups of files; one for each, or none.
 
     `phases & solid` and `solid & phases` cut, as often as you like: there may be 16 walls at most.
     """
@@ -43,6 +44,7 @@ class Phases(ByWalls):
         self,
         *functions: Function,
         gradients: Sequence[Function | None] | Library | None = None,
+        names: Sequence[str] = (),
     ) -> None:
         if not 2 <= len(functions) <= 6 or not all(map(callable, functions)):
             raise InvalidArgument(
@@ -56,13 +58,16 @@ class Phases(ByWalls):
         slopes = gradients or [getattr(function, "gradient", None) for function in functions]
         if len(slopes) != len(functions):
             raise InvalidArgument("gradients are one for each function, or None")
+        if names and len(names) != len(functions):
+            raise InvalidArgument(f"there are {len(names)} names for {len(functions)} phases")
+        self.region_names = tuple(names)
         self._functions, self._slopes = functions, tuple(slopes)
         self._region: Solid | None = None
 
     def __and__(self, other: Solid) -> Phases:
         if not isinstance(other, Solid):
             return NotImplemented
-        cut = Phases(*self._functions, gradients=self._slopes)
+        cut = Phases(*self._functions, gradients=self._slopes, names=self.region_names)
         cut._region = other if self._region is None else self._region & other
         return cut
 
