@@ -25,6 +25,15 @@ type growingComplex struct {
 	untold         bool     // a part of the download was not oriented
 }
 
+// growthOf is the empty mesh of a specification. The boundary alone has simplices of one dimension less.
+func growthOf(spec *pb.MeshSpec) *growingComplex {
+	k := int(spec.GetDimension())
+	if spec.GetBoundaryOnly() {
+		k--
+	}
+	return &growingComplex{k: k, d: int(spec.GetAmbientDimension())}
+}
+
 // absorb takes one chunk; true when a revision is complete with it. An error is a delta that does not
 // fit what came before.
 func (g *growingComplex) absorb(chunk *pb.DeltaChunk) (bool, error) {

@@ -91,8 +91,7 @@ var errLeft = errors.New("left")
 // mesh failed.
 func (c *Client) follow(ctx context.Context, info *pb.Mesh, onProgress func(*pb.Progress), every bool,
 	each func(*Mesh) bool) error {
-	spec := info.GetSpec()
-	growth := &growingComplex{k: int(spec.GetDimension()), d: int(spec.GetAmbientDimension())}
+	growth := growthOf(info.GetSpec())
 	var progress *pb.Progress
 	note := func(now *pb.Progress) {
 		if progress = now; onProgress != nil && now != nil {
@@ -300,8 +299,7 @@ func (c *Client) Download(ctx context.Context, name string, revision uint64) (*M
 	if info.GetEndTime() == nil && revision == 0 {
 		return nil, newError(ErrFailedPrecondition, "FAILED_PRECONDITION", "%s is not over: %v", name, info.GetState())
 	}
-	spec := info.GetSpec()
-	growth := &growingComplex{k: int(spec.GetDimension()), d: int(spec.GetAmbientDimension())}
+	growth := growthOf(info.GetSpec())
 	err = c.parts(ctx, &pb.DownloadMeshRequest{Name: name, Revision: revision}, func(part *pb.DownloadMeshResponse) error {
 		growth.revision = part.GetRevision()
 		points, err := numbers(part.GetPoints(), -1, growth.d)

@@ -10,8 +10,10 @@ from stellate._wire.arrays import to_wire
 Event = stellate_pb2.WatchMeshResponse
 
 
-def delta(revision, first=0, points=(), added=(), removed=(), complete=True, walls=()) -> Event:
-    """`walls`: pairs of a vertex and its walls as bits."""
+def delta(
+    revision, first=0, points=(), added=(), removed=(), complete=True, walls=(), labels=()
+) -> Event:
+    """`walls`: pairs of a vertex and its walls as bits. `labels`: of the added simplices."""
     body = mesh_pb2.MeshDelta(revision=revision, first_vertex=first)
     if len(points):
         body.points.CopyFrom(to_wire(np.asarray(points, dtype=float)))
@@ -21,6 +23,7 @@ def delta(revision, first=0, points=(), added=(), removed=(), complete=True, wal
         body.removed.CopyFrom(indices(removed))
     body.boundary_vertices.extend(vertex for vertex, _ in walls)
     body.boundary_walls.extend(bits for _, bits in walls)
+    body.added_labels = bytes(labels)
     return Event(delta=stellate_pb2.DeltaChunk(delta=body, complete=complete))
 
 

@@ -27,6 +27,7 @@ grpc::Status Replay::CreateMesh(grpc::ServerContext*, const v1::CreateMeshReques
                                 v1::Mesh* mesh) {
   mesh->set_name("meshes/recorded");
   *mesh->mutable_spec() = request->spec();
+  mesh->mutable_spec()->set_boundary_only(TextAt(entry_, "only") == "boundary");
   return grpc::Status::OK;
 }
 

@@ -69,9 +69,11 @@ class Streams:
         self.entries: list[dict[str, object]] = []
 
     def add(self, name, about, k, d, attempts, mesh=None, ends=("SUCCEEDED", "CONVERGED", "SAMPLED"),
-            error=None, revision=0) -> None:  # fmt: skip
+            error=None, revision=0, only=None) -> None:  # fmt: skip
         """attempts: (from_revision, messages, then)."""
         entry = {"name": name, "about": about, "dimension": k, "ambient_dimension": d}
+        if only:
+            entry["only"] = only
         entry["attempts"] = []
         for i, (start, messages, then) in enumerate(attempts):
             raw = [m if isinstance(m, bytes) else m.SerializeToString() for m in messages]
@@ -170,6 +172,15 @@ def write_streams() -> None:
         [(0, [delta(1, 0, TRIANGLE[:1], walls=[(0, 1)]), delta(2, 1, TRIANGLE[1:], complete=False,
               walls=[(2, 7)])], "UNAVAILABLE"),
          (1, [Event(reset_mesh=stellate_pb2.ResetMesh()), *ends, final(3, 2)], "OK")], path,
+    )  # fmt: skip
+    corners = np.column_stack([TRIANGLE, np.zeros(3)])
+    outline = stellate.Mesh(corners, np.array(EDGES), walls=np.array([1, 1, 3], "u8"))
+    streams.add(
+        "outline", "the boundary alone of a surface in space: simplices of one dimension less", 2, 3,
+        [(0, [delta(1, 0, corners[:2], EDGES[:1], walls=[(0, 1), (1, 1)], labels=[1, 0])], "UNAVAILABLE"),
+         (1, [delta(2, 2, corners[2:], EDGES, EDGES[:1], walls=[(2, 3)], labels=[0, 1, 1, 0, 1, 2]),
+              final(3, 3)], "OK")],
+        outline, revision=2, only="boundary",
     )  # fmt: skip
     newer = [
         UNKNOWN_FIELD,

@@ -35,7 +35,9 @@ class Replay(FakeServer):
 
     def GetMesh(self, request, context):
         spec = mesh_pb2.MeshSpec(
-            dimension=self.entry["dimension"], ambient_dimension=self.entry["ambient_dimension"]
+            dimension=self.entry["dimension"],
+            ambient_dimension=self.entry["ambient_dimension"],
+            boundary_only=self.entry.get("only") == "boundary",
         )
         return mesh_pb2.Mesh(name=request.name, spec=spec, state=mesh_pb2.MESH_STATE_RUNNING)
 

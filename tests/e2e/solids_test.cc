@@ -114,6 +114,46 @@ TEST_F(SolidsFromCpp, MaterialsAreRegionsInMeshesDownloadsAndFiles) {
   ASSERT_EQ(mesh->faces(2).size(), 7u);
   EXPECT_EQ(All({mesh->faces(2)[6]}), Rim(grain.simplices));
   EXPECT_THROW(mesh->Region(3), std::invalid_argument);
+  EXPECT_EQ(mesh->region_names, composite.names());
+  EXPECT_EQ(fetched->region_names, composite.names());
+}
+
+// The boundary alone has the labels on both sides, closed surfaces of regions, creases and groups.
+TEST_F(SolidsFromCpp, TheBoundaryAloneHasSidesAndCreases) {
+  Labels composite({{"matrix", Box(-kOne, kOne)}, {"grain", Ball(0.6)}});
+  MeshOptions options = At(0.25);
+  options.boundary_only = true;
+  const Expected<Mesh> mesh = MeshManifold(composite, options);
+  ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
+  EXPECT_TRUE(mesh->report.certified()) << mesh->report.text;
+  ASSERT_TRUE(mesh->is_boundary());
+  ASSERT_EQ(static_cast<Eigen::Index>(mesh->sides.size()), mesh->simplices.cols());
+  EXPECT_TRUE(mesh->labels.empty());
+  EXPECT_EQ(mesh->dimension(), 2);
+  EXPECT_EQ(mesh->boundary().size(), 7u);
+  EXPECT_EQ(mesh->edges().size(), 12u);
+  EXPECT_EQ(mesh->corners().size(), 8u);
+  // By the divergence theorem, from each triangle turned outwards.
+  const auto enclosed = [](const Mesh& surface) {
+    double sum = 0;
+    const SimplexMatrix outwards = OrientedSimplices(surface);
+    for (Eigen::Index j = 0; j < outwards.cols(); ++j) {
+      Eigen::Matrix3d corners;
+      for (int i = 0; i < 3; ++i) corners.col(i) = surface.points.col(outwards(i, j));
+      sum += corners.determinant() / 6;
+    }
+    return sum;
+  };
+  const double grain = 4 * std::numbers::pi / 3 * 0.216;
+  EXPECT_NEAR(enclosed(mesh->Region(2)), grain, 0.09);
+  EXPECT_NEAR(enclosed(mesh->Region(1)), 8 - grain, 0.09);
+  EXPECT_THROW(mesh->Region(0), std::invalid_argument);
+  const std::string path = ::testing::TempDir() + "boundary.msh";
+  ASSERT_TRUE(mesh->Save(path).has_value());
+  std::ifstream file(path);
+  const std::string text(std::istreambuf_iterator<char>(file), {});
+  for (const char* name : {"\"wall_0\"", "\"wall_6\"", "\"walls_0_2\"", "\"walls_0_2_4\""})
+    EXPECT_NE(text.find(name), std::string::npos) << name;
 }
 
 // The simplices of each group, by its name, and the corners' coordinates, of a .msh file.

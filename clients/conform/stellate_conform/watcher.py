@@ -35,6 +35,7 @@ class Recorded(Declared):
         self.entry, self.attempts = entry, list(entry["attempts"])
         self.spec.dimension = entry["dimension"]
         self.spec.ambient_dimension = entry["ambient_dimension"]
+        self.spec.boundary_only = entry.get("only") == "boundary"
         self.path = folder / f"{entry['name']}.txt"
         self.complaint = ""
 

@@ -96,15 +96,16 @@ Walls ListOf(WallBits bits) {
   return walls;
 }
 
-// The faces of a mesh, of a dimension below k; with labels, those between regions, too.
+// The faces of a mesh, of a dimension below k; with labels, those between regions, too; of the
+// boundary alone of its own dimension, too.
 std::vector<Face> FacesOf(const Mesh& mesh, int dimension,
                           const std::vector<std::uint8_t>& labels) {
   const std::vector<WallBits>& walls = mesh.walls;
-  if (walls.empty() || dimension < 0 || dimension >= mesh.dimension() ||
+  if (walls.empty() || dimension < 0 || dimension >= mesh.dimension() + mesh.is_boundary() ||
       mesh.simplices.cols() == 0) {
     return {};
   }
-  SimplexMatrix rows = Bounding(mesh.simplices, labels);
+  SimplexMatrix rows = mesh.is_boundary() ? mesh.simplices : Bounding(mesh.simplices, labels);
   while (rows.rows() - 1 > dimension && rows.cols() > 0) rows = Ridges(rows, walls);
   std::map<Walls, std::vector<Index>> of_walls;
   for (Index j = 0; j < rows.cols(); ++j) {
@@ -122,21 +123,34 @@ std::vector<Face> FacesOf(const Mesh& mesh, int dimension,
 
 Mesh Mesh::Region(int label) const {
   std::vector<Index> columns;
+  std::vector<Sides> alone;
+  std::set<int> all(labels.begin(), labels.end());
   for (size_t j = 0; j < labels.size(); ++j) {
     if (labels[j] == label) columns.push_back(static_cast<Index>(j));
   }
-  if (columns.empty()) {
+  for (size_t j = 0; j < sides.size(); ++j) {
+    all.insert({sides[j].behind, sides[j].ahead});
+    const bool behind = sides[j].behind == label, ahead = sides[j].ahead == label;
+    if (!behind && !ahead) continue;
+    columns.push_back(static_cast<Index>(j));  // what else is there is outside of it
+    alone.push_back(
+        {behind ? sides[j].behind : std::uint8_t{0}, ahead ? sides[j].ahead : std::uint8_t{0}});
+  }
+  all.erase(0);
+  if (columns.empty() || label == 0) {
     std::string have;
-    for (const int known : std::set<int>(labels.begin(), labels.end())) {
+    for (const int known : all) {
       have += (have.empty() ? "" : ", ") + std::to_string(known);
     }
     throw std::invalid_argument("the mesh has no region " + std::to_string(label) + "; it has [" +
                                 have + "]");
   }
-  return {points, simplices(Eigen::all, columns), {}, walls};
+  return {points, simplices(Eigen::all, columns), {}, walls, {}, {}, std::move(alone)};
 }
 
-std::vector<Face> Mesh::boundary() const { return FacesOf(*this, dimension() - 1, {}); }
+std::vector<Face> Mesh::boundary() const {
+  return FacesOf(*this, is_boundary() ? dimension() : dimension() - 1, {});
+}
 
 std::vector<Face> Mesh::faces(int dimension) const { return FacesOf(*this, dimension, labels); }
 
@@ -149,7 +163,7 @@ std::vector<Face> Mesh::edges() const {
 std::vector<Face> Mesh::corners() const {
   std::vector<Face> corners = faces(0);
   std::erase_if(corners, [this](const Face& face) {
-    return face.walls.size() < static_cast<size_t>(dimension());
+    return face.walls.size() < static_cast<size_t>(dimension() + is_boundary());
   });
   return corners;
 }

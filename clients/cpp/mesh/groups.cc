@@ -1,6 +1,8 @@
 #include "mesh/groups.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <iterator>
 #include <map>
 #include <utility>
 
@@ -10,16 +12,19 @@ namespace {
 using Eigen::Index;
 using Ids = std::vector<std::uint32_t>;
 
-// The facets, ascending in each column, as the cells that have them induce their orientation: where
-// two have one, that in the region of the lower label, which comes first.
-SimplexMatrix Turned(const SimplexMatrix& facets, const SimplexMatrix& cells) {
+// Turns facets, ascending in each column, as the cells that have them induce their orientation:
+// where two have one, that in the region of the lower label, which comes first. `labels`: of the
+// cells, or empty; then the facets get no sides.
+void Turn(Group* facets_of, const SimplexMatrix& cells, const std::vector<std::uint8_t>& labels) {
+  const SimplexMatrix facets = facets_of->simplices;
+  std::vector<Sides>& sides = facets_of->sides;
+  if (!labels.empty()) sides.resize(static_cast<size_t>(facets.cols()));
   std::map<Ids, Index> wanted;
   for (Index j = 0; j < facets.cols(); ++j) {
     wanted[Ids(facets.col(j).begin(), facets.col(j).end())] = j;
   }
   std::vector<bool> on(static_cast<size_t>(cells.maxCoeff()) + 1, false);
   for (const std::uint32_t id : facets.reshaped()) on[id] = true;
-  SimplexMatrix turned = facets;
   Ids facet(static_cast<size_t>(facets.rows()));
   for (Index j = 0; j < cells.cols(); ++j) {
     for (Index out = 0; out < cells.rows(); ++out) {
@@ -33,16 +38,40 @@ SimplexMatrix Turned(const SimplexMatrix& facets, const SimplexMatrix& cells) {
       std::sort(ascending.begin(), ascending.end());
       const auto place = wanted.find(ascending);
       if (place == wanted.end()) continue;
+      Sides* const of = labels.empty() ? nullptr : &sides[static_cast<size_t>(place->second)];
+      if (of != nullptr && of->behind != 0) {
+        of->ahead = labels[static_cast<size_t>(j)];
+        continue;
+      }
+      if (of != nullptr) of->behind = labels[static_cast<size_t>(j)];
       if (out % 2 == 1) std::iter_swap(facet.end() - 2, facet.end() - 1);
-      std::copy(facet.begin(), facet.end(), turned.col(place->second).begin());
-      wanted.erase(place);
+      std::copy(facet.begin(), facet.end(), facets_of->simplices.col(place->second).begin());
+      if (of == nullptr) wanted.erase(place);
     }
   }
-  return turned;
 }
 
-Group GroupOf(Face face, int tag) {
-  Group group{tag, face.walls.size() > 1 ? "walls" : "wall", 0, std::move(face.simplices)};
+// A name without what file formats take for something else: .obj has spaces between names of
+// groups, .msh quotes around them. "region_1" where there is none, or another region has it, too.
+std::string NameOf(int label, const std::vector<std::string>& names) {
+  const auto cleaned = [&names](size_t i) {
+    std::string name;
+    for (const char c : names[i]) name += c == ' ' || c == '"' || c == '\\' ? '_' : c;
+    return name;
+  };
+  const auto at = static_cast<size_t>(label) - 1;
+  if (at < names.size() && !names[at].empty()) {
+    const std::string name = cleaned(at);
+    bool alone = true;
+    for (size_t i = 0; i < names.size(); ++i) alone = alone && (i == at || cleaned(i) != name);
+    if (alone) return name;
+  }
+  return "region_" + std::to_string(label);
+}
+
+Group GroupOf(Face face, std::ptrdiff_t tag) {
+  Group group{static_cast<int>(tag), face.walls.size() > 1 ? "walls" : "wall", 0,
+              std::move(face.simplices)};
   for (const int wall : face.walls) {
     group.name += '_';
     group.name += std::to_string(wall);
@@ -53,28 +82,58 @@ Group GroupOf(Face face, int tag) {
 
 }  // namespace
 
+namespace {
+
+// A boundary without its inside: its walls, and where they meet.
+std::vector<Group> GroupsOfBoundary(const Mesh& mesh) {
+  const SimplexMatrix cells = OrientedSimplices(mesh);
+  std::map<Ids, Index> place;
+  for (Index j = 0; j < mesh.simplices.cols(); ++j) {
+    place[Ids(mesh.simplices.col(j).begin(), mesh.simplices.col(j).end())] = j;
+  }
+  std::vector<Group> groups;
+  for (int dimension = mesh.dimension(); dimension >= 0; --dimension) {
+    for (Face& face : mesh.faces(dimension)) {
+      Group& group = groups.emplace_back(GroupOf(std::move(face), std::ssize(groups) + 1));
+      for (Index j = 0; dimension == mesh.dimension() && j < group.simplices.cols(); ++j) {
+        const Ids ids(group.simplices.col(j).begin(), group.simplices.col(j).end());
+        const Index at = place.at(ids);
+        Sides sides = mesh.sides[static_cast<size_t>(at)];
+        if (cells.col(at) != group.simplices.col(j)) std::swap(sides.behind, sides.ahead);
+        group.simplices.col(j) = cells.col(at);
+        group.sides.push_back(sides);
+      }
+    }
+  }
+  return groups;
+}
+
+}  // namespace
+
 std::vector<Group> GroupsOf(const Mesh& mesh) {
+  if (mesh.is_boundary()) return GroupsOfBoundary(mesh);
   SimplexMatrix cells = OrientedSimplices(mesh);
   std::vector<Group> groups;
   std::map<std::uint8_t, std::vector<Index>> regions;
   for (size_t j = 0; j < mesh.labels.size(); ++j) {
     regions[mesh.labels[j]].push_back(static_cast<Index>(j));
   }
-  if (regions.size() < 2) groups.push_back({1, "inside", 0, cells});
+  if (regions.empty()) groups.push_back({1, "inside", 0, cells});
   std::vector<Index> by_region;
+  std::vector<std::uint8_t> labels;
   for (const auto& [label, columns] : regions) {
     by_region.insert(by_region.end(), columns.begin(), columns.end());
-    if (regions.size() < 2) continue;
-    groups.push_back({static_cast<int>(groups.size()) + 1, "region_" + std::to_string(label), 0,
-                      cells(Eigen::all, columns)});
+    labels.insert(labels.end(), columns.size(), label);
+    const bool is_all = regions.size() == 1 && mesh.region_names.empty();
+    groups.push_back({static_cast<int>(groups.size()) + 1,
+                      is_all ? "inside" : NameOf(label, mesh.region_names), 0,
+                      cells(Eigen::all, columns), label});
   }
   if (!by_region.empty()) cells = SimplexMatrix(cells(Eigen::all, by_region));
   for (int dimension = mesh.dimension() - 1; dimension >= 0; --dimension) {
     for (Face& face : mesh.faces(dimension)) {
-      if (dimension == mesh.dimension() - 1 && dimension >= 1) {
-        face.simplices = Turned(face.simplices, cells);
-      }
-      groups.push_back(GroupOf(std::move(face), static_cast<int>(groups.size()) + 1));
+      Group& group = groups.emplace_back(GroupOf(std::move(face), std::ssize(groups) + 1));
+      if (dimension == mesh.dimension() - 1 && dimension >= 1) Turn(&group, cells, labels);
     }
   }
   return groups;

@@ -10,12 +10,17 @@ namespace stellate::client {
 
 // Simplices of one dimension that lie on the same walls; on none: the mesh's own, or a region's.
 struct Group {
-  int tag;           // from 1 on: the mesh's own first, then the boundary's, edges', corners'
-  std::string name;  // "inside", or "region_1" of several regions; "wall_0", "walls_0_1", ...
+  int tag;  // from 1 on: the mesh's own first, then the boundary's, edges', corners'
+  // "inside", or the region's name, "region_1" if it has none; "wall_0", "walls_0_1", ...
+  std::string name;
   std::uint64_t walls;
   // (j+1) x m, oriented: the boundary's as the mesh's own induce it, outwards if the mesh fills
   // space; what is between two regions outwards from that of the lower label.
   SimplexMatrix simplices;
+  int label = 0;  // of the region that it is; else 0
+  // Of a mesh with labels, m: of faces of dimension k - 1 the labels that each faces away from and
+  // faces. Else empty.
+  std::vector<Sides> sides = {};
 
   int dimension() const { return static_cast<int>(simplices.rows()) - 1; }
 };

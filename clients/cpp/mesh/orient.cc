@@ -136,9 +136,17 @@ SimplexMatrix OrientedSimplices(const Mesh& mesh) {
     }
     return told;
   }
+  const int d = mesh.ambient_dimension();
+  if (mesh.is_boundary() && mesh.dimension() == d - 1) {
+    SimplexMatrix outwards = mesh.simplices;
+    for (Eigen::Index j = 0; j < outwards.cols(); ++j) {
+      const Sides& sides = mesh.sides[static_cast<size_t>(j)];
+      if (sides.behind < sides.ahead) Turn(outwards.col(j));
+    }
+    return outwards;
+  }
   std::vector<Eigen::Index> component;
   SimplexMatrix oriented = Orient(mesh.simplices, &component);
-  const int d = mesh.ambient_dimension();
   if (mesh.dimension() == d) TurnPositive(mesh.points, &oriented);
   if (component.empty() || mesh.dimension() != d - 1) return oriented;
   // d! times what each component encloses, as cones from the origin; below zero with normals

@@ -55,8 +55,11 @@ std::string Field(const char* name, const std::string& text) {
 }
 
 // What the file says of the whole mesh.
-std::string FieldData(const Report& report) {
+std::string FieldData(const Report& report, const std::vector<Group>& groups) {
   std::string xml = "<FieldData>\n" + Field("version", "stellate " STELLATE_VERSION);
+  std::string names;
+  for (const Group& group : groups) names += group.name + "\n";
+  if (groups.size() > 1) xml += Field("groups", names);
   if (report.termination != Termination::kUnknown) {
     const std::uint8_t certified = report.certified() ? 1 : 0;
     xml +=
@@ -99,16 +102,27 @@ std::string PointData(const Mesh& mesh) {
   return xml.empty() ? xml : "<PointData>\n" + xml + "</PointData>\n";
 }
 
-// The groups of the cells, which are not all of one.
-std::string CellData(const std::vector<Group>& groups) {
-  std::vector<std::int32_t> tags;
+// The groups of the cells, which are not all of one, and the labels of a mesh that has some.
+std::string CellData(const std::vector<Group>& groups, bool has_labels) {
+  std::vector<std::int32_t> tags, regions, sides;
   std::vector<std::uint64_t> walls;
   for (const Group& group : groups) {
-    tags.insert(tags.end(), static_cast<size_t>(group.simplices.cols()), group.tag);
-    walls.insert(walls.end(), static_cast<size_t>(group.simplices.cols()), group.walls);
+    const auto count = static_cast<size_t>(group.simplices.cols());
+    tags.insert(tags.end(), count, group.tag);
+    walls.insert(walls.end(), count, group.walls);
+    regions.insert(regions.end(), count, group.label);
+    for (size_t j = 0; j < count; ++j) {
+      const Sides of = group.sides.empty() ? Sides() : group.sides[j];
+      sides.insert(sides.end(), {of.behind, of.ahead});
+    }
   }
-  return "<CellData>\n" + DataArray("Int32", "group", 1, tags.data(), std::ssize(tags)) +
-         DataArray("UInt64", "walls", 1, walls.data(), std::ssize(walls)) + "</CellData>\n";
+  std::string xml = DataArray("Int32", "group", 1, tags.data(), std::ssize(tags)) +
+                    DataArray("UInt64", "walls", 1, walls.data(), std::ssize(walls));
+  if (has_labels) {
+    xml += DataArray("Int32", "region", 1, regions.data(), std::ssize(regions)) +
+           DataArray("Int32", "sides", 2, sides.data(), std::ssize(sides));
+  }
+  return "<CellData>\n" + xml + "</CellData>\n";
 }
 
 }  // namespace
@@ -119,11 +133,12 @@ std::string Vtu(const Mesh& mesh) {
   std::string xml =
       "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" "
       "byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<UnstructuredGrid>\n" +
-      FieldData(mesh.report) + "<Piece NumberOfPoints=\"" + std::to_string(points.cols()) +
+      FieldData(mesh.report, groups) + "<Piece NumberOfPoints=\"" + std::to_string(points.cols()) +
       "\" NumberOfCells=\"" + std::to_string(CountSimplices(groups)) + "\">\n<Points>\n" +
       DataArray("Float64", "Points", 3, points.data(), points.size()) + "</Points>\n" +
       Cells(groups) + PointData(mesh);
-  if (groups.size() > 1) xml += CellData(groups);
+  const bool has_labels = !mesh.labels.empty() || mesh.is_boundary();
+  if (groups.size() > 1 || has_labels) xml += CellData(groups, has_labels);
   return xml + "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
 }
 

@@ -43,8 +43,8 @@ void Tell(const std::string& epsilon_reason, Report* report) {
   report->text += std::string("      epsilon  ") + epsilon + ", " + epsilon_reason + "\n";
 }
 
-Expected<std::string> CreateMesh(v1::Stellate::Stub& stub, Oracle& oracle,
-                                 const MeshOptions& options) {
+Expected<v1::Mesh> CreateMesh(v1::Stellate::Stub& stub, Oracle& oracle,
+                              const MeshOptions& options) {
   const Expected<v1::MeshSpec> spec = ToSpec(oracle, options);
   if (!spec) return tl::unexpected(spec.error());
   grpc::ClientContext context;
@@ -54,7 +54,7 @@ Expected<std::string> CreateMesh(v1::Stellate::Stub& stub, Oracle& oracle,
   v1::Mesh mesh;
   const grpc::Status status = stub.CreateMesh(&context, request, &mesh);
   if (!status.ok()) return tl::unexpected(FromStatus(status));
-  return mesh.name();
+  return mesh;
 }
 
 }  // namespace client
@@ -67,7 +67,10 @@ Expected<std::string> DeclareMesh(Oracle& oracle, const MeshOptions& options) {
   if (!host) return tl::unexpected(host.error());
   const Expected<client::Request> request = client::Settle(*host, oracle, options);
   if (!request) return tl::unexpected(request.error());
-  return client::CreateMesh(*v1::Stellate::NewStub(host->channel), oracle, request->options);
+  const auto mesh =
+      client::CreateMesh(*v1::Stellate::NewStub(host->channel), oracle, request->options);
+  if (!mesh) return tl::unexpected(mesh.error());
+  return mesh->name();
 }
 
 }  // namespace stellate

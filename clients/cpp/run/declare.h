@@ -26,9 +26,8 @@ void Take(const ChosenEpsilon& chosen, Request* request);
 // it was given.
 void Tell(const std::string& epsilon_reason, Report* report);
 
-// The name of a new mesh. Not tried again when it fails: whether the server made the mesh would not
-// be known.
-Expected<std::string> CreateMesh(v1::Stellate::Stub& stub, Oracle& oracle,
-                                 const MeshOptions& options);
+// A new mesh, as the server says it. Not tried again when it fails: whether the server made the
+// mesh would not be known.
+Expected<v1::Mesh> CreateMesh(v1::Stellate::Stub& stub, Oracle& oracle, const MeshOptions& options);
 
 }  // namespace stellate::client

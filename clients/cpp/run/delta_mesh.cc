@@ -19,6 +19,8 @@ namespace {
 template <size_t N>
 class FixedSet final : public SimplexSet {
  public:
+  explicit FixedSet(size_t labels) : labels_each_(labels) {}
+
   std::size_t bytes() const override {
     return nodes_.capacity() * sizeof(Node) + first_of_.capacity() * sizeof(first_of_[0]) +
            labels_.capacity();
@@ -43,8 +45,9 @@ class FixedSet final : public SimplexSet {
         turned_[place] = (marks.turned[i / 8] >> (i % 8) & 1) != 0;
       }
       if (marks.labels != nullptr) {
-        labels_.resize(nodes_.size());
-        labels_[place] = static_cast<std::uint8_t>(marks.labels[i]);
+        labels_.resize(nodes_.size() * labels_each_);
+        const auto each = static_cast<std::ptrdiff_t>(labels_each_);
+        std::copy_n(marks.labels + i * each, each, labels_.begin() + place * each);
       }
       first_of_[simplex[0]] = place;
       ++size_;
@@ -71,7 +74,7 @@ class FixedSet final : public SimplexSet {
   std::optional<Simplices> Sorted() const override {
     Simplices sorted{SimplexMatrix(N, static_cast<Eigen::Index>(size_)), {}, {}};
     if (!turned_.empty()) sorted.turned.assign((size_ + 7) / 8, 0);
-    if (!labels_.empty()) sorted.labels.assign(size_, 0);
+    if (!labels_.empty()) sorted.labels.assign(size_ * labels_each_, 0);
     size_t column = 0;
     std::vector<std::pair<Simplex, std::uint32_t>> star;  // and their nodes
     for (const std::uint32_t first : first_of_) {
@@ -88,7 +91,11 @@ class FixedSet final : public SimplexSet {
         if (node < turned_.size() && turned_[node]) {
           sorted.turned[column / 8] |= static_cast<std::uint8_t>(1 << column % 8);
         }
-        if (node < labels_.size()) sorted.labels[column] = labels_[node];
+        if (node * labels_each_ < labels_.size()) {
+          const auto each = static_cast<std::ptrdiff_t>(labels_each_);
+          std::copy_n(labels_.begin() + node * each, each,
+                      sorted.labels.begin() + static_cast<std::ptrdiff_t>(column) * each);
+        }
         ++column;
       }
     }
@@ -119,43 +126,45 @@ class FixedSet final : public SimplexSet {
   std::vector<std::uint32_t> first_of_;  // by vertex
   std::vector<Node> nodes_;
   std::vector<bool> turned_;          // by node, as far as any was
-  std::vector<std::uint8_t> labels_;  // by node, as far as any has one
-  std::uint32_t free_ = kNone;        // a list of its own
+  std::vector<std::uint8_t> labels_;  // by node, so many each, as far as any has one
+  size_t labels_each_;
+  std::uint32_t free_ = kNone;  // a list of its own
   size_t size_ = 0;
 };
 
 }  // namespace
 
-std::unique_ptr<SimplexSet> MakeSimplexSet(int k) {
+std::unique_ptr<SimplexSet> MakeSimplexSet(int k, std::size_t labels) {
   switch (k) {
     case 1:
-      return std::make_unique<FixedSet<2>>();
+      return std::make_unique<FixedSet<2>>(labels);
     case 2:
-      return std::make_unique<FixedSet<3>>();
+      return std::make_unique<FixedSet<3>>(labels);
     case 3:
-      return std::make_unique<FixedSet<4>>();
+      return std::make_unique<FixedSet<4>>(labels);
     case 4:
-      return std::make_unique<FixedSet<5>>();
+      return std::make_unique<FixedSet<5>>(labels);
     case 5:
-      return std::make_unique<FixedSet<6>>();
+      return std::make_unique<FixedSet<6>>(labels);
     case 6:
-      return std::make_unique<FixedSet<7>>();
+      return std::make_unique<FixedSet<7>>(labels);
     case kMaxSimplexDimension:
-      return std::make_unique<FixedSet<8>>();
+      return std::make_unique<FixedSet<8>>(labels);
     default:
       return nullptr;
   }
 }
 
-Expected<DeltaMesh> DeltaMesh::Create(int k, int d, std::size_t most_bytes) {
-  std::unique_ptr<SimplexSet> set = MakeSimplexSet(k);
+Expected<DeltaMesh> DeltaMesh::Create(int k, int d, bool boundary_only, std::size_t most_bytes) {
+  const std::size_t labels = boundary_only ? 2 : 1;
+  std::unique_ptr<SimplexSet> set = MakeSimplexSet(k, labels);
   if (set == nullptr) {
     return Fail(ErrorCode::kRefused,
                 "dimension is " + std::to_string(k) + " but this client holds meshes of 1 to " +
                     std::to_string(kMaxSimplexDimension),
                 k < 1 ? "INVALID_ARGUMENT" : "LIMIT_EXCEEDED");
   }
-  return DeltaMesh(k, d, std::move(set), most_bytes);
+  return DeltaMesh(k, d, labels, std::move(set), most_bytes);
 }
 
 std::size_t DeltaMesh::HalfOfTheMemory() {
@@ -181,7 +190,7 @@ void DeltaMesh::Reset() {
   coordinates_.clear();
   boundary_.clear();
   orientation_.reset();
-  simplex_set_ = MakeSimplexSet(k_);
+  simplex_set_ = MakeSimplexSet(k_, labels_per_simplex_);
 }
 
 Expected<void> DeltaMesh::Absorb(v1::DeltaChunk&& chunk) {
@@ -254,15 +263,15 @@ Expected<void> DeltaMesh::Apply(const v1::MeshDelta& delta, const char* turned) 
   const Expected<Eigen::Index> added = CountRows(delta.added(), width);
   if (!added) return tl::unexpected(added.error());
   const std::string& labels = delta.added_labels();
-  // Of the boundary alone those of both sides, which the orientation says as well.
-  const bool of_sides = labels.size() == 2 * static_cast<size_t>(*added);
-  if (!labels.empty() && !of_sides && labels.size() != static_cast<size_t>(*added)) {
+  const std::size_t most = labels_per_simplex_ * static_cast<size_t>(*added);
+  const bool may_lack = labels_per_simplex_ == 1;  // without an arrangement there are none
+  if (labels.size() != most && !(may_lack && labels.empty())) {
     return tl::unexpected(BrokenProtocol("labels that do not fit their simplices"));
   }
   if (!simplex_set_->Remove(delta.removed().data().data(), *removed)) {
     return tl::unexpected(BrokenProtocol("the removal of a simplex that is not there"));
   }
-  const SimplexSet::Marks marks{turned, labels.empty() || of_sides ? nullptr : labels.data()};
+  const SimplexSet::Marks marks{turned, labels.empty() ? nullptr : labels.data()};
   if (!simplex_set_->Add(delta.added().data().data(), *added, vertices(), marks)) {
     return tl::unexpected(BrokenProtocol("a simplex with a vertex that it never sent"));
   }
@@ -286,7 +295,12 @@ Expected<Mesh> DeltaMesh::Take() const {
   mesh.points = Eigen::Map<const Eigen::MatrixXd>(
       coordinates_.data(), d_, static_cast<Eigen::Index>(coordinates_.size()) / d_);
   mesh.simplices = std::move(simplices->columns);
-  mesh.labels = std::move(simplices->labels);
+  std::vector<std::uint8_t>& labels = simplices->labels;
+  if (labels_per_simplex_ == 1) {
+    mesh.labels = std::move(labels);
+  } else {
+    for (size_t i = 0; i < labels.size(); i += 2) mesh.sides.push_back({labels[i], labels[i + 1]});
+  }
   mesh.orientation = orientation_;
   if (orientation_ && parts_simplices_ > 0) mesh.orientation->turned = std::move(simplices->turned);
   const auto count = static_cast<size_t>(mesh.simplices.cols());

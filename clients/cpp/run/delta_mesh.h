@@ -22,7 +22,7 @@ class SimplexSet {
   // What is known of simplices besides their ids; null where it is not.
   struct Marks {
     const char* turned = nullptr;  // a bit for each, as Orientation has them
-    const char* labels = nullptr;  // a byte for each, its region's
+    const char* labels = nullptr;  // of each, as many bytes as MakeSimplexSet was given
   };
   // `count` simplices of k+1 uint32 each; `ids` need not be aligned. False, and the set is spoilt,
   // where a vertex is not below `vertices`.
@@ -30,8 +30,8 @@ class SimplexSet {
                    const Marks& marks) = 0;
   // False, and the set is spoilt, where one is not there.
   virtual bool Remove(const char* ids, Eigen::Index count) = 0;
-  // (k+1) x m, columns in ascending order, which of them are turned, and their labels where they
-  // have any; nothing where one is there twice.
+  // (k+1) x m, columns in ascending order, which of them are turned, and their labels, one column
+  // after the other, where they have any; nothing where one is there twice.
   struct Simplices {
     SimplexMatrix columns;
     std::vector<std::uint8_t> turned, labels;
@@ -39,17 +39,19 @@ class SimplexSet {
   virtual std::optional<Simplices> Sorted() const = 0;
 };
 
-// Null unless 1 <= k <= kMaxSimplexDimension.
+// Null unless 1 <= k <= kMaxSimplexDimension. `labels`: of each simplex, where there are any.
 inline constexpr int kMaxSimplexDimension = 7;
-std::unique_ptr<SimplexSet> MakeSimplexSet(int k);
+std::unique_ptr<SimplexSet> MakeSimplexSet(int k, std::size_t labels);
 
 // Puts a mesh together from WatchMesh streams. Chunks are kept until their revision is complete,
 // so that what a broken stream leaves undone can be sent again from revision() on.
 class DeltaMesh {
  public:
-  // At most `most_bytes` of it are in memory: half of what this machine has, unless it is said.
-  // Errors: a k that this client cannot hold.
-  static Expected<DeltaMesh> Create(int k, int d, std::size_t most_bytes = HalfOfTheMemory());
+  // `k`: of its simplices. `boundary_only`: each of them has two labels. At most `most_bytes` of it
+  // are in memory: half of what this machine has, unless it is said. Errors: a k that this client
+  // cannot hold.
+  static Expected<DeltaMesh> Create(int k, int d, bool boundary_only = false,
+                                    std::size_t most_bytes = HalfOfTheMemory());
 
   // Takes the chunk's arrays. Errors: what does not follow on revision() and what came before, and
   // more than there is room for.
@@ -77,8 +79,13 @@ class DeltaMesh {
   Expected<Mesh> Take() const;
 
  private:
-  DeltaMesh(int k, int d, std::unique_ptr<SimplexSet> set, std::size_t most_bytes)
-      : k_(k), d_(d), most_bytes_(most_bytes), simplex_set_(std::move(set)) {}
+  DeltaMesh(int k, int d, std::size_t labels, std::unique_ptr<SimplexSet> set,
+            std::size_t most_bytes)
+      : k_(k),
+        d_(d),
+        labels_per_simplex_(labels),
+        most_bytes_(most_bytes),
+        simplex_set_(std::move(set)) {}
 
   static std::size_t HalfOfTheMemory();
   // With so many bytes more, which have come.
@@ -87,6 +94,7 @@ class DeltaMesh {
   Expected<void> NoteWalls(const v1::MeshDelta& delta);
 
   int k_, d_;
+  std::size_t labels_per_simplex_;  // 1; 2 of the boundary alone
   std::size_t most_bytes_;
   std::uint64_t revision_ = 0;
   std::vector<v1::MeshDelta> pending_;

@@ -46,7 +46,7 @@ class Download {
     if (options_.revision == 0) {
       if (auto ok = Settle(); !ok) return tl::unexpected(ok.error());
     }
-    auto builder = DeltaMesh::Create(k, d);
+    auto builder = DeltaMesh::Create(k, d, status_.spec().boundary_only());
     if (!builder) return tl::unexpected(builder.error());
     builder_ = std::make_unique<DeltaMesh>(std::move(*builder));
     if (auto ok = Fetch(); !ok) return tl::unexpected(ok.error());
@@ -168,6 +168,8 @@ class Download {
                          " simplices, after it had announced " + std::to_string(vertices_) +
                          " and " + std::to_string(simplices_)));
     }
+    mesh->region_names.assign(status_.spec().region_names().begin(),
+                              status_.spec().region_names().end());
     if (HasEnded(status_) && revision_ == status_.revision()) {
       mesh->report = ReportOf(status_);
     }

@@ -88,13 +88,16 @@ Expected<Mesh> Run::Go() {
 }
 
 Expected<void> Run::Create() {
-  const int k = oracle_.dimension() - (options_.boundary_only.value_or(false) ? 1 : 0);
-  auto builder = DeltaMesh::Create(k, oracle_.ambient_dimension());
+  // What no client could hold is refused before there is a mesh.
+  auto builder = DeltaMesh::Create(oracle_.dimension(), oracle_.ambient_dimension());
+  if (!builder) return tl::unexpected(builder.error());
+  const Expected<v1::Mesh> mesh = CreateMesh(*stub_, oracle_, options_);
+  if (!mesh) return tl::unexpected(mesh.error());
+  name_ = mesh->name();
+  builder = DeltaMesh::Create(SimplexDimension(mesh->spec()), oracle_.ambient_dimension(),
+                              mesh->spec().boundary_only());
   if (!builder) return tl::unexpected(builder.error());
   builder_ = std::make_unique<DeltaMesh>(std::move(*builder));
-  Expected<std::string> name = CreateMesh(*stub_, oracle_, options_);
-  if (!name) return tl::unexpected(name.error());
-  name_ = std::move(*name);
   return {};
 }
 
@@ -200,6 +203,7 @@ Expected<Mesh> Run::Conclude(const v1::Mesh& final) {
   Expected<Mesh> mesh = builder_->Take();
   if (!mesh) return mesh;
   mesh->report = ReportOf(final);
+  mesh->region_names.assign(final.spec().region_names().begin(), final.spec().region_names().end());
   const Counts& counts = mesh->report.counts;
   if (counts.vertices != static_cast<std::uint64_t>(mesh->points.cols()) ||
       counts.simplices != static_cast<std::uint64_t>(mesh->simplices.cols())) {

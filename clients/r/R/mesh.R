@@ -125,7 +125,9 @@ check <- function(closest_point, dimension, ambient_dimension, bounding_box = NU
 serve <- function(closest_point, name, server, ..., credentials = NULL) {
   client <- python()$Client(server, credentials)
   on.exit(client$close())
-  oracle <- oracle_of(closest_point, client$get(name)$dimension, list(...))
+  info <- client$get(name)
+  # The dimension of the manifold: the boundary alone has simplices of one dimension less.
+  oracle <- oracle_of(closest_point, info$dimension + info$boundary_only, list(...))
   worker <- do.call(client$pull, c(list(name), abilities(oracle)))
   on.exit(worker$close(), add = TRUE, after = FALSE)
   answer_all(worker, oracle)

@@ -107,7 +107,10 @@ pub fn download(name: &str, revision: u64, connection: Connection) -> Result<Mes
 }
 
 fn empty(info: &MeshInfo) -> GrowingComplex {
-    let (k, d) = info.spec.as_ref().map_or((1, 2), |spec| (spec.dimension, spec.ambient_dimension));
+    // The boundary alone has simplices of one dimension less.
+    let (k, d) = info.spec.as_ref().map_or((1, 2), |spec| {
+        (spec.dimension.saturating_sub(u32::from(spec.boundary_only)), spec.ambient_dimension)
+    });
     GrowingComplex::new(k as usize, d as usize)
 }
 

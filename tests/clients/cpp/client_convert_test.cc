@@ -271,7 +271,7 @@ v1::DeltaChunk Delta(std::uint64_t revision, std::uint64_t first, const Eigen::M
 // Neither a revision without an end nor revisions without an end.
 TEST(DeltaMesh, AServerThatSendsOnAndOnIsEndedAtSomePoint) {
   for (const bool complete : {false, true}) {
-    auto builder = DeltaMesh::Create(1, 2, /*most_bytes=*/1 << 20);
+    auto builder = DeltaMesh::Create(1, 2, /*boundary_only=*/false, /*most_bytes=*/1 << 20);
     ASSERT_TRUE(builder.has_value());
     Expected<void> ok;
     std::uint64_t sent = 0;
@@ -360,6 +360,32 @@ TEST(DeltaMesh, LabelsStayWithTheirSimplices) {
   auto plain = DeltaMesh::Create(1, 2);
   ASSERT_TRUE(plain->Absorb(Delta(1, 0, points, {0, 1}, {})));
   EXPECT_TRUE(plain->Take()->labels.empty());
+}
+
+TEST(DeltaMesh, TheBoundaryAloneHasTwoLabelsPerSimplexAndPlainMeshesHaveNot) {
+  const auto labelled = [](v1::DeltaChunk chunk, const std::string& labels) {
+    chunk.mutable_delta()->set_added_labels(labels);
+    return chunk;
+  };
+  const Eigen::MatrixXd points = Eigen::MatrixXd::Random(2, 4), none(2, 0);
+  auto builder = DeltaMesh::Create(1, 2, /*boundary_only=*/true);
+  ASSERT_TRUE(builder.has_value());
+  ASSERT_TRUE(builder->Absorb(
+      labelled(Delta(1, 0, points, {2, 3, 0, 1, 1, 2}, {}), std::string{3, 0, 1, 0, 0, 2})));
+  Mesh mesh = *builder->Take();
+  EXPECT_EQ(mesh.sides, (std::vector<Sides>{{1, 0}, {0, 2}, {3, 0}}));
+  EXPECT_TRUE(mesh.labels.empty());
+  // 0 1 goes, its place is taken by 0 3, and 1 2 comes again with other labels.
+  ASSERT_TRUE(builder->Absorb(
+      labelled(Delta(2, 4, none, {0, 3, 1, 2}, {0, 1, 1, 2}), std::string{4, 1, 1, 4})));
+  mesh = *builder->Take();
+  EXPECT_EQ(mesh.sides, (std::vector<Sides>{{4, 1}, {1, 4}, {3, 0}}));
+  for (const std::string& wrong : {std::string(), std::string{1}, std::string{1, 2, 3}}) {
+    auto other = DeltaMesh::Create(1, 2, /*boundary_only=*/true);
+    EXPECT_FALSE(other->Absorb(labelled(Delta(1, 0, points, {0, 1}, {}), wrong))) << wrong.size();
+  }
+  auto plain = DeltaMesh::Create(1, 2);
+  EXPECT_FALSE(plain->Absorb(labelled(Delta(1, 0, points, {0, 1}, {}), std::string{1, 2})));
 }
 
 TEST(DeltaMesh, BeginsAnewWhenTheServerDoes) {

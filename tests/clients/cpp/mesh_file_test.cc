@@ -331,6 +331,15 @@ TEST(Regions, AreGroupsAndWhatLiesBetweenIsAFaceTurnedOutOfTheLowerLabel) {
   } catch (const std::invalid_argument& error) {
     EXPECT_STREQ(error.what(), "the mesh has no region 1; it has [2, 7]");
   }
+  mesh.labels = {2, 7};
+  mesh.region_names = {"", "soft \"matrix\"", "", "", "", "", "grain"};
+  EXPECT_EQ(client::GroupsOf(mesh)[0].name, "soft__matrix_");
+  EXPECT_EQ(client::GroupsOf(mesh)[1].name, "grain");
+  EXPECT_EQ(client::GroupsOf(mesh)[3].sides, (std::vector<Sides>{{2, 7}}));
+  EXPECT_EQ(client::GroupsOf(mesh)[1].label, 7);
+  mesh.region_names[1] = "grain";  // not to be told apart
+  EXPECT_EQ(client::GroupsOf(mesh)[0].name, "region_2");
+  mesh.region_names.clear();
   mesh.labels = {4, 4};  // one region: the inside
   EXPECT_EQ(client::GroupsOf(mesh)[0].name, "inside");
   EXPECT_EQ(mesh.faces(2).size(), 1u);

@@ -27,6 +27,15 @@ struct Orientation {
   std::vector<std::uint8_t> turned;
 };
 
+// The labels that the normal of a simplex, by the order of its ids, points away from and into; 0 is
+// outside, and a solid without labels has the label 1. If the manifold does not fill space (k < d):
+// those on the positive and the negative side of the simplex's wall.
+struct Sides {
+  std::uint8_t behind = 0, ahead = 0;
+
+  bool operator==(const Sides&) const = default;
+};
+
 // A simplicial k-complex in R^d.
 struct Mesh {
   Eigen::MatrixXd points;   // d x n, a vertex a column
@@ -39,14 +48,24 @@ struct Mesh {
   std::optional<Orientation> orientation = {};
   // Of an arrangement of walls, m: the region that each simplex is in; else empty.
   std::vector<std::uint8_t> labels = {};
+  // Of the boundary alone (MeshOptions::boundary_only), m: the labels on both sides of each
+  // simplex; else empty.
+  std::vector<Sides> sides = {};
+  // The names of the regions with the labels 1, 2, ..., as the oracle gave them; "": none.
+  std::vector<std::string> region_names = {};
 
-  // The part with one label, of the same points. Its boundary is where it ends or meets others.
-  // Throws std::invalid_argument where no simplex has the label.
+  // Whether this is a boundary without its inside.
+  bool is_boundary() const { return !sides.empty(); }
+
+  // The part with one label, of the same points. Its boundary is where it ends or meets others. Of
+  // the boundary alone: the closed surface of that region, its normals outwards. Throws
+  // std::invalid_argument where no simplex has the label.
   Mesh Region(int label) const;
 
   // The faces of a manifold with boundary, by ascending walls: the boundary's parts, one for each
   // wall, of dimension k - 1; curves where two walls meet or more; points where k walls meet; and
   // those of any dimension below k. What lies between two regions is among all but the boundary.
+  // The boundary alone has faces of its own dimension, too, which are its parts.
   std::vector<Face> boundary() const;
   std::vector<Face> edges() const;
   std::vector<Face> corners() const;
@@ -67,10 +86,13 @@ struct Mesh {
   //   .vtu  k <= 3; beyond d = 3 the first three coordinates, and all as point data "coordinates";
   //         field data "epsilon", "certified" (0 or 1), "verdict" and "version" (UTF-8 bytes)
   // Of a mesh with boundary .msh, .vtu and .obj have its faces too, of all dimensions, after its
-  // simplices: in .msh as physical groups "inside", or "region_1" for label 1 where there are
-  // several, "wall_0", ..., "walls_0_1", ...; in .obj as groups of the same names; in .vtu with
-  // cell data "walls", the walls as bits (0 inside), and "group", .msh's number of it, and point
-  // data "walls". Faces between regions are among them, turned outwards from the lower label. All
+  // simplices: in .msh as physical groups "inside", or where there are several regions by the
+  // region's name, "region_1" for label 1 if it has none, "wall_0", ..., "walls_0_1", ...; in .obj
+  // as groups of the same names; in .vtu with cell data "walls", the walls as bits (0 inside), and
+  // "group", .msh's number of it, field data "groups", their names, a line each, and point data
+  // "walls". With labels .vtu has cell data "region", a simplex's label, 0 of faces, and "sides",
+  // of the faces of dimension k - 1 the labels that they face away from and face (0, 0 of others).
+  // Faces between regions are among them, turned outwards from the lower label. All
   // but .txt are oriented as by OrientedSimplices(mesh). The file is replaced when the new one is
   // whole. kFileFailed when the format cannot hold the mesh or the file cannot be written.
   Expected<void> Save(const std::string& path) const;
@@ -84,8 +106,9 @@ Expected<void> CheckSave(const std::string& path, int dimension, int ambient_dim
 // they are when the complex is not an orientable pseudomanifold.
 SimplexMatrix OrientedSimplices(const SimplexMatrix& simplices);
 // The same, and the normals of a hypersurface (k = d - 1) outwards, component by component;
-// simplices that fill space (k = d) with positive volumes. By mesh.orientation, where it is known;
-// meshes that grow, or that no server made, are oriented here.
+// simplices that fill space (k = d) with positive volumes; the boundary alone from the larger of
+// its two labels into the smaller one. By mesh.orientation, where it is known; meshes that grow, or
+// that no server made, are oriented here.
 SimplexMatrix OrientedSimplices(const Mesh& mesh);
 
 }  // namespace stellate

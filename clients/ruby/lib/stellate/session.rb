@@ -69,7 +69,8 @@ module Stellate
     end
 
     def growth_of(info)
-      Growth.new(info.spec.dimension, info.spec.ambient_dimension)
+      k = info.spec.dimension - (info.spec.boundary_only ? 1 : 0) # the boundary alone
+      Growth.new(k, info.spec.ambient_dimension)
     end
 
     def assemble(client, info, revision)

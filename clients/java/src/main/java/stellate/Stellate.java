@@ -99,7 +99,9 @@ public final class Stellate {
   }
 
   private static Growth empty(stellate.v1.Mesh info) {
-    return new Growth(info.getSpec().getDimension(), info.getSpec().getAmbientDimension());
+    // The boundary alone has simplices of one dimension less.
+    int k = info.getSpec().getDimension() - (info.getSpec().getBoundaryOnly() ? 1 : 0);
+    return new Growth(k, info.getSpec().getAmbientDimension());
   }
 
   private static void follow(
