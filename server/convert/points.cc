@@ -59,7 +59,10 @@ Allowed<MeshRequest> FromProto(const v1::Reconstruction& spec, const Config& con
   if (spec.points() < static_cast<std::uint64_t>(points.spec.dimension) + 2) {
     return tl::unexpected(Refused(Unfit(
         "points", Message("points is ", spec.points(), " but a closed ", points.spec.dimension,
-                          "-manifold needs ", points.spec.dimension + 2, " at least"))));
+                          "-manifold needs ", points.spec.dimension + 2, " at least",
+                          spec.points() < spec.ambient_dimension()
+                              ? ": a row is a point; are rows and columns exchanged?"
+                              : ""))));
   }
   return request;
 }
