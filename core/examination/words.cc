@@ -184,8 +184,8 @@ constexpr Words kWords[] = {
      "may exist",
      ""},
     {"NO_TANGENTS", Severity::kNote,
-     "there is no tangent_basis: the server finds tangent spaces itself, at about {extra} more "
-     "closest points a vertex",
+     "there is no tangent_basis: the server reads tangent spaces off closest points; only where "
+     "epsilon is coarse beside the reach it asks for up to {extra} more of these a vertex",
      ""},
     {"SPEED", Severity::kNote,
      "{rate} queries a second in batches of {batch}, {single} one at a time", ""},
