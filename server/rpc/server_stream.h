@@ -80,8 +80,8 @@ class ServerStream : public grpc::ServerBidiReactor<Incoming<Request>, Response>
   }
 
   void StopServing() override {
+    EndWith(ShuttingDown());  // first: what Leave brings about is no other end
     Leave();
-    EndWith(ShuttingDown());
   }
 
  protected:

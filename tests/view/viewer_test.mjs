@@ -70,7 +70,7 @@ test("a mesh grows before one's eyes, and goes on with the gateway's successor",
   const name = await stage.mesh({
     shape: "two spheres",
     epsilon: 0.12,
-    hold: 2500,
+    hold: 700,
     label: "growing",
   });
   const first = await stage.gateway(name, "--port", port);

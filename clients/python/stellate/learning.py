@@ -29,10 +29,8 @@ class Reconstructor:
     Args are those of stellate.reconstruct. It goes into sklearn.base.clone and searches of parameters;
     scikit-learn itself is not needed.
 
-    Attributes, after fit:
-      mesh_: the mesh, a FinishedMesh; row i of `mesh_.points` is row i of X.
-      places_: (n,) str: what became of each point.
-      n_features_in_: d.
+    After `fit` it has `mesh_`, a FinishedMesh, of which row i of `points` is row i of X; `places_`, (n,) str,
+    what became of each point; and `n_features_in_`, which is d.
     """
 
     mesh_: FinishedMesh

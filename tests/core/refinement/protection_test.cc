@@ -61,7 +61,7 @@ TEST_P(Protected, IsReachedWithFewMoreVertices) {
 }
 
 INSTANTIATE_TEST_SUITE_P(Catalogue, Protected,
-                         ::testing::Values(Asked{"circle:1", 0.3, 0.1, 1.12},
+                         ::testing::Values(Asked{"circle:10", 0.3, 0.1, 1.12},
                                            Asked{"torus:1:0.4", 0.1, 0.1, 1.12},
                                            Asked{"clifford-torus", 0.28, 0.1, 1.12},
                                            Asked{"sphere:3:4", 0.4, 0.02, 1.2}));

@@ -344,7 +344,8 @@ TEST_F(LiveExamineTest, IsNotRecorded) {
     Examination unfinished(stub_.get(), SpecOfSphere());
     ASSERT_NE(unfinished.Name(), "");
     server_.reset();
-    EXPECT_EQ(unfinished.Finish().error_code(), StatusCode::UNAVAILABLE);
+    const grpc::Status status = unfinished.Finish();
+    EXPECT_EQ(status.error_code(), StatusCode::UNAVAILABLE) << status.error_message();
   }
   Start(config);
   grpc::ClientContext context;
