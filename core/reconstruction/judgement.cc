@@ -159,7 +159,7 @@ class Judge {
 
   // Why a manifold is not certified.
   std::string WhatIsMissing() const {
-    if (const std::string other = OtherDimension(); !other.empty()) return other;
+    if (std::string other = OtherDimension(); !other.empty()) return other;
     if (known_.against > 0) return DescribeCauses(mesh_, known_);
     if (!LooksRight())
       return Message("most places do not look ", spec_.dimension, "-dimensional, see the warnings");

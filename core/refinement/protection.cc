@@ -11,8 +11,8 @@ namespace {
 
 // Where protection is reached at all, it took 2 to 20 % more vertices, and every few rounds left
 // fewer weak stars.
-constexpr double kMostGrowth = 1.5;
-constexpr std::uint64_t kLeastGrowth = 200;
+constexpr double kMostProtectionGrowth = 1.5;
+constexpr std::uint64_t kLeastProtectionGrowth = 200;
 constexpr std::uint64_t kPatience = 60;
 
 }  // namespace
@@ -38,8 +38,8 @@ bool Protection<K>::HasGoneTooFar(std::uint64_t vertices) {
     fewest_ = weak_;
     rounds_since_ = 0;
   }
-  const double most = std::max(kMostGrowth * static_cast<double>(vertices_before_),
-                               static_cast<double>(vertices_before_ + kLeastGrowth));
+  const double most = std::max(kMostProtectionGrowth * static_cast<double>(vertices_before_),
+                               static_cast<double>(vertices_before_ + kLeastProtectionGrowth));
   return ++rounds_since_ > kPatience || static_cast<double>(vertices) > most;
 }
 

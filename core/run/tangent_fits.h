@@ -61,7 +61,9 @@ class TangentFits {
   };
   Neighbourhood Around(const double* y, const IndexedPoints* looked_at) const;
   std::optional<Fit> FitAt(const double* y, const double* guess, const IndexedPoints* others) const;
-  std::size_t numbers() const { return static_cast<std::size_t>(k_ * d_); }
+  std::size_t numbers() const {
+    return static_cast<std::size_t>(k_) * static_cast<std::size_t>(d_);
+  }
 
   int k_, d_;
   IndexedPoints known_;

@@ -162,9 +162,8 @@ std::vector<Face> Mesh::edges() const {
 
 std::vector<Face> Mesh::corners() const {
   std::vector<Face> corners = faces(0);
-  std::erase_if(corners, [this](const Face& face) {
-    return face.walls.size() < static_cast<size_t>(dimension() + is_boundary());
-  });
+  const size_t least = static_cast<size_t>(dimension()) + (is_boundary() ? 1 : 0);
+  std::erase_if(corners, [least](const Face& face) { return face.walls.size() < least; });
   return corners;
 }
 

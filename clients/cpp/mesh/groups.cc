@@ -61,7 +61,7 @@ std::string NameOf(int label, const std::vector<std::string>& names) {
   };
   const auto at = static_cast<size_t>(label) - 1;
   if (at < names.size() && !names[at].empty()) {
-    const std::string name = cleaned(at);
+    std::string name = cleaned(at);
     bool alone = true;
     for (size_t i = 0; i < names.size(); ++i) alone = alone && (i == at || cleaned(i) != name);
     if (alone) return name;
