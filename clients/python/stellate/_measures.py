@@ -1,4 +1,4 @@
-"""What is measured on a mesh: volumes, normals, curvatures.
+"""What is measured on a mesh: volumes, normals, Minkowski functionals.
 
 Vertices lie on M, and the mesh is within O(epsilon^2) of it. So volumes, and integrals of smooth
 functions, are as near: half of epsilon is a quarter of the error. Normals of simplices are within
@@ -10,7 +10,7 @@ from __future__ import annotations
 import dataclasses
 import itertools
 import math
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,12 +19,9 @@ from ._faces import facets_in_one
 from ._files.surface import boundary
 from ._wire.orientation import Orientation
 from .errors import InvalidArgument
-from .oracle import CheckedOracle
 
 if TYPE_CHECKING:
     from ._mesh import Mesh
-
-_STEP = 6e-6  # of differences, of the mesh's size: about the cube root of rounding
 
 
 def volumes(points: np.ndarray, simplices: np.ndarray) -> np.ndarray:
@@ -91,72 +88,69 @@ def boundary_of(mesh: Complex) -> tuple[np.ndarray, Orientation | None]:
     return ascending[order], Orientation.of(_is_odd(facets[order]))
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Curvature:
-    """How a hypersurface bends at the points of a mesh.
-
-    Positive where it bends away from its normal: those of a sphere of radius r are 1 / r.
+@dataclasses.dataclass(frozen=True)
+class Minkowski:
+    """The Minkowski functionals of a solid of space.
 
     Attributes:
-      principal: (n, k), ascending in each row.
+      volume: of the solid.
+      area: of its boundary.
+      mean_curvature: the integral of the mean curvature (k1 + k2) / 2 over the boundary, edges included:
+        half of the lengths times the angles that the normal turns by. Of a ball of radius r 4 pi r, of a
+        convex solid 2 pi times its mean width.
+      euler: the Euler characteristic of the solid.
     """
 
-    principal: np.ndarray
+    volume: float
+    area: float
+    mean_curvature: float
+    euler: int
 
     @property
-    def mean(self) -> np.ndarray:
-        """(n,): the mean of the principal curvatures."""
-        return np.asarray(self.principal.mean(axis=1))
-
-    @property
-    def gauss(self) -> np.ndarray:
-        """(n,): their product."""
-        return np.asarray(self.principal.prod(axis=1))
+    def quermassintegrals(self) -> tuple[float, float, float, float]:
+        """W0 to W3, the coefficients of Steiner's formula: V(r) = W0 + 3 W1 r + 3 W2 r^2 + W3 r^3."""
+        return (
+            self.volume, self.area / 3, self.mean_curvature / 3, 4 * math.pi * self.euler / 3,
+        )  # fmt: skip
 
 
-def curvature(mesh: Mesh, oracle: Any) -> Curvature:
-    """At the points of a hypersurface f = 0, from f's derivatives; see Mesh.curvature."""
-    checked = CheckedOracle(oracle)
-    d = mesh.ambient_dimension
-    if not checked.has_jacobian or mesh.dimension != d - 1 or checked.ambient_dimension != d:
+def minkowski(mesh: Mesh) -> Minkowski:
+    """See Mesh.minkowski."""
+    if mesh.ambient_dimension != 3 or mesh.dimension not in (2, 3):
         raise InvalidArgument(
-            "curvature is of a hypersurface and the oracle of its one equation, as ImplicitManifold "
-            "and SignedDistance are; of others Mesh.normals has what is known"
+            "Minkowski functionals are of solids of space, and of closed surfaces there: this mesh has "
+            f"dimension {mesh.dimension} in R^{mesh.ambient_dimension}"
         )
-    slopes = _gradients(checked, mesh.points)
-    steep = np.linalg.norm(slopes, axis=1)
-    if not (steep > 0).all():
+    surface = mesh.boundary_mesh() if mesh.dimension == 3 else mesh
+    # A closed surface is of twice the characteristic of what it bounds.
+    of_solid = euler(mesh.simplices) if mesh.dimension == 3 else euler(mesh.simplices) // 2
+    return Minkowski(enclosed_volume(surface), surface.volume, _turning(surface) / 2, of_solid)
+
+
+def _turning(surface: Complex) -> float:
+    """The sum of the lengths of edges times the angles between the normals beside them."""
+    rows, across = _oriented(surface), normals(surface)
+    ends = np.concatenate([rows[:, [0, 1]], rows[:, [1, 2]], rows[:, [2, 0]]])
+    owner = np.tile(np.arange(len(rows)), 3)
+    ascending = np.sort(ends, axis=1)
+    order = np.lexsort(ascending.T[::-1])
+    pairs = ascending[order].reshape(-1, 2, 2) if len(order) % 2 == 0 else np.empty((1, 2, 2))
+    same = (pairs[:, 0] == pairs[:, 1]).all(axis=1)
+    if not same.all() or (pairs[1:, 0] == pairs[:-1, 0]).all(axis=1).any():
         raise InvalidArgument(
-            f"the equation's gradient is 0 at {mesh.points[int(steep.argmin())].tolist()}"
+            "an edge of the surface is not between two triangles alone: the surface ends there, or "
+            "parts meet along it, and its turning is not known"
         )
-    unit = slopes / steep[:, None]
-    step = _STEP * float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
-    columns = [
-        (_gradients(checked, mesh.points + v) - _gradients(checked, mesh.points - v)) / (2 * step)
-        for v in step * np.eye(d)
-    ]
-    bend = np.stack(columns, axis=2)
-    bend = (bend + bend.transpose(0, 2, 1)) / 2
-    along = np.linalg.svd(unit[:, None, :])[2][:, 1:].transpose(0, 2, 1)  # (n, d, k), across `unit`
-    within = along.transpose(0, 2, 1) @ bend @ along / steep[:, None, None]
-    principal = np.linalg.eigvalsh(within)
-    return Curvature(principal if _points_outwards(mesh, unit) else -principal[:, ::-1])
-
-
-def _gradients(oracle: CheckedOracle, points: np.ndarray) -> np.ndarray:
-    """(n, d)"""
-    slopes = oracle.jacobians(np.ascontiguousarray(points))
-    if slopes.shape[1] != 1:
-        raise InvalidArgument(f"curvature is of one equation, and the oracle has {slopes.shape[1]}")
-    return slopes[:, 0]
-
-
-def _points_outwards(mesh: Mesh, unit: np.ndarray) -> bool:
-    """Whether vectors at the points are on the side of the mesh's normals; so if it has none."""
-    if mesh.oriented_simplices() is None:
-        return True
-    at = unit[mesh.simplices].sum(axis=1)
-    return bool(((normals(mesh) * at).sum(axis=1)).sum() >= 0)
+    first, second = owner[order].reshape(-1, 2).T
+    # The edge as its first triangle runs along it: around it the normal turns by the angle, positive
+    # where the surface is convex.
+    way = surface.points[ends[order][::2, 1]] - surface.points[ends[order][::2, 0]]
+    lengths = np.linalg.norm(way, axis=1)
+    sine = (np.cross(across[first], across[second]) * way).sum(axis=1) / np.where(
+        lengths > 0, lengths, 1
+    )
+    cosine = (across[first] * across[second]).sum(axis=1)
+    return float((lengths * np.arctan2(sine, cosine)).sum())
 
 
 def _sides(points: np.ndarray, simplices: np.ndarray) -> np.ndarray:

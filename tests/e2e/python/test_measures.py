@@ -181,3 +181,118 @@ def test_curvature_and_gauss_bonnet(server):
     for other in (manifolds.SpecialOrthogonal3(), object()):
         with pytest.raises(stellate.StellateError):
             mesh.curvature(other)
+
+
+def without_equations(oracle):
+    """The same manifold, of which closest points alone are known."""
+    bare = type("Bare", (), {})()
+    for name in ("dimension", "ambient_dimension", "bounding_box", "closest_point"):
+        setattr(bare, name, getattr(oracle, name))
+    return bare
+
+
+def tori(x):
+    """The Clifford torus in R^4, flat: its mean curvature vector is -x, the form's square 4."""
+    return np.stack([x[:, 0] ** 2 + x[:, 1] ** 2 - 0.5, x[:, 2] ** 2 + x[:, 3] ** 2 - 0.5], axis=1)
+
+
+def test_curvature_in_codimension_two(server):
+    oracle = stellate.ImplicitManifold(
+        tori, ambient_dimension=4, dimension=2, bounding_box=([-1] * 4, [1] * 4)
+    )
+    errors = []
+    for epsilon in (0.2, 0.1):
+        mesh = stellate.mesh(oracle, epsilon, server=server)
+        assert mesh.certified
+        for bend, most in (
+            (mesh.curvature(oracle), 1e-4),
+            (mesh.curvature(without_equations(oracle)), 1e-3),
+        ):
+            assert np.abs(bend.gauss).max() < most  # flat in its own metric
+            assert np.abs(bend.mean_vector + mesh.points).max() < most
+            assert np.abs((bend.second**2).sum(axis=(1, 2, 3)) - 4).max() < 10 * most
+            across = np.einsum("nijd,ndk->nijk", bend.second, bend.tangents)
+            assert np.abs(across).max() < 1e-9
+        fitted = mesh.curvature()
+        errors.append(np.abs(fitted.mean_vector + mesh.points).max())
+        with pytest.raises(stellate.InvalidArgument, match="principal curvatures"):
+            fitted.principal  # noqa: B018
+    assert np.log2(errors[0] / errors[1]) > 1.5 and errors[1] < 0.08, errors
+
+
+def test_curvature_of_rotations(server):
+    """SO(3) in R^9 is a round sphere of radius sqrt 8 for its own metric: 6 / 8 everywhere."""
+    oracle = manifolds.SpecialOrthogonal3()
+    errors = []
+    for epsilon in (0.5, 0.35):
+        mesh = stellate.mesh(oracle, epsilon, server=server)
+        assert np.abs(mesh.curvature(oracle).scalar - 0.75).max() < 1e-3
+        errors.append(np.sqrt(np.mean((mesh.curvature().scalar - 0.75) ** 2)))
+    assert np.log(errors[0] / errors[1]) / np.log(0.5 / 0.35) > 1.5 and errors[1] < 0.1, errors
+    with pytest.raises(stellate.InvalidArgument, match="principal"):
+        mesh.curvature().gauss  # noqa: B018
+
+
+def test_curvature_of_points_alone_keeps_gauss_bonnet(server):
+    errors, totals = [], []
+    for epsilon in (0.08, 0.04):
+        mesh = stellate.mesh(manifolds.Torus(), epsilon, server=server)
+        bend = mesh.curvature()
+        ring = np.hypot(mesh.points[:, 0], mesh.points[:, 1])
+        along = (ring - 1) / 0.4 / ring
+        errors.append(np.abs(bend.principal - np.sort([along, 0 * along + 2.5], axis=0).T).max())
+        totals.append(abs(bend.gauss @ mesh.point_volumes()))
+    assert 1.5 < np.log2(errors[0] / errors[1]) < 2.8 and errors[1] < 0.1, errors
+    assert totals[1] < totals[0] / 2 and totals[1] < 0.005 * 8 * PI, totals
+
+
+def test_curvature_of_a_solids_surface_and_of_a_curve(server):
+    ball = stellate.mesh(s.Ball(), 0.2, server=server)
+    bend = ball.boundary_mesh().curvature()
+    used = np.unique(ball.boundary_mesh().simplices)  # points inside are in no triangle
+    assert np.isfinite(bend.mean[used]).all() and np.isnan(bend.mean).any()
+    assert np.abs(bend.mean[used] - 1).max() < 0.1
+    circle = stellate.mesh(manifolds.Sphere(1), 0.1, server=server)
+    assert np.abs(circle.curvature().principal - 1).max() < 0.03
+    with pytest.raises(stellate.InvalidArgument, match="boundary_mesh"):
+        ball.curvature()
+    with pytest.raises(stellate.InvalidArgument, match="a fit takes 9"):
+        stellate.Mesh(np.vstack([np.eye(3), np.zeros((1, 3))]), np.array([[0, 1, 2]])).curvature()
+
+
+def test_minkowski_functionals(server):
+    held(
+        server,
+        s.Ball,
+        (0.3, 0.15),
+        [
+            (lambda mesh: mesh.minkowski().volume, 4 / 3 * PI),
+            (lambda mesh: mesh.minkowski().area, 4 * PI),
+            (lambda mesh: mesh.minkowski().mean_curvature, 4 * PI),
+        ],
+    )
+    box = stellate.mesh(s.Box([0] * 3, [1, 2, 3]), 0.5, server=server).minkowski()
+    # Pi times the sum of its three sides, exactly, as the mesh is.
+    assert (box.volume, box.area) == (pytest.approx(6), pytest.approx(22))
+    assert box.mean_curvature == pytest.approx(6 * PI) and box.euler == 1
+    w, r = box.quermassintegrals, 0.3  # Steiner: what lies within r of the box
+    assert w[0] + 3 * w[1] * r + 3 * w[2] * r**2 + w[3] * r**3 == pytest.approx(
+        6 + 22 * r + 6 * PI * r**2 + 4 / 3 * PI * r**3
+    )
+    hollow = stellate.mesh(s.Box([-1] * 3, [1] * 3) - s.Ball(0.5), 0.15, server=server)
+    found = hollow.minkowski()
+    assert found.euler == 2 and hollow.betti() == (1, 0, 1, 0)
+    assert found.area == pytest.approx(24 + PI, rel=0.005)
+    assert found.mean_curvature == pytest.approx(6 * PI - 2 * PI, rel=0.005)
+    # A level set: 2 pi^2 R, whatever its tube is.
+    torus = stellate.mesh(manifolds.Torus(), 0.06, server=server).minkowski()
+    assert torus.mean_curvature == pytest.approx(2 * PI**2, rel=1e-3) and torus.euler == 0
+    with pytest.raises(stellate.InvalidArgument, match="solids of space"):
+        stellate.mesh(manifolds.Sphere(1), 0.3, server=server).minkowski()
+
+
+def test_betti_numbers(server):
+    so3 = stellate.mesh(manifolds.SpecialOrthogonal3(), 0.6, server=server)
+    assert so3.betti() == (1, 1, 1, 1) and so3.betti(3) == (1, 0, 0, 1)
+    torus = stellate.mesh(manifolds.Torus(), 0.2, server=server)
+    assert torus.betti() == torus.betti(5) == (1, 2, 1)
