@@ -292,13 +292,20 @@ class Mesh:
         .obj  curves and surfaces, d <= 3.
         .ply  curves and surfaces, d <= 3.
         .stl  surfaces of space, binary, in single precision as the format has it.
-              Of a solid (k = d = 3) these four hold the surface, outwards, around a cavity into that.
+        .3mf  surfaces of space, for 3D printers, in millimetres: an object for each region.
+        .glb  surfaces of space, for Blender and browsers: a node for each region, smooth normals and a
+              material for each wall, in single precision, z upwards.
+              Of a solid (k = d = 3) these six hold the surface, outwards, around a cavity into that.
+        .npz  any k and d, exact, by numpy: arrays of the names that a Mesh has, and "certified",
+              "verdict", "epsilon", for np.load.
         .msh  k <= 3, d <= 3: Gmsh's, version 2.2.
         .vtu  k <= 3. When d > 3 the points are the first three coordinates, and all of them are the
               point data "coordinates". Its field data are "epsilon", "certified" (0 or 1),
               "verdict" and "version" (UTF-8 bytes), and "groups": the groups' names, a line each.
         .vtk, as .vtu, and .avs .bdf .cgns .dat .dato .e .exo .f3grid .fem .h5m .hmf .inp .mdpa .med
-        .mesh .meshb .nas .post .su2 .tec .vol .xdmf .xmf .xml, d <= 3, by meshio.
+        .mesh .meshb .nas .post .su2 .tec .vol .xdmf .xmf .xml, d <= 3, by meshio. Of a mesh
+        with boundary part.xdmf has a part_facets.xdmf beside it, as FEniCS reads them: cells with
+        "region", facets with "wall", a wall's number plus 1; of two coordinates where d = 2.
 
         Of a mesh with boundary .msh, .vtu, .vtk and .obj have its faces too, of all dimensions, after
         its simplices: in .msh as physical groups, "inside", or where there are several regions by

@@ -16,7 +16,7 @@ import numpy as np
 
 from .._complex import Complex, in_space
 from ..errors import SaveError
-from . import meshio_formats, vtu
+from . import glb, meshio_formats, npz, three_mf, vtu
 from .groups import Group, groups
 from .surface import boundary, drawn
 
@@ -45,8 +45,13 @@ def save(mesh: Complex, path: str) -> None:
     """Mesh.save."""
     form = _choose(path, mesh.dimension, mesh.ambient_dimension)
     if form.meshio is not None:
-        with _replaced(path) as draft:
-            meshio_formats.write(form.meshio, mesh, cells(mesh), draft)
+        with contextlib.ExitStack() as stack:
+            beside = None
+            if form.meshio.facets and mesh.faces(mesh.dimension - 1) and not _is_special(path):
+                root, ending = os.path.splitext(path)
+                beside = stack.enter_context(_replaced(f"{root}_facets{ending}"))
+            draft = stack.enter_context(_replaced(path))
+            meshio_formats.write(form.meshio, mesh, cells(mesh), draft, beside)
         return
     _write(form.contents(mesh), path)
 
@@ -247,6 +252,14 @@ def _vtu_lines(mesh: Complex) -> Iterator[str]:
     return vtu.lines(mesh, cells(mesh))
 
 
+def _three_mf(mesh: Complex) -> bytes:
+    return three_mf.contents(mesh, cells(mesh))
+
+
+def _glb(mesh: Complex) -> bytes:
+    return glb.contents(mesh, cells(mesh))
+
+
 def _text(lines: Callable[[Complex], Iterator[str]]) -> Callable[[Complex], bytes]:
     return lambda mesh: ("\n".join(lines(mesh)) + "\n").encode()
 
@@ -261,8 +274,11 @@ _FORMATS = {
     ".obj": _Format(1, 2, 3, f"{_LOW}, {_SOLIDS}", _text(_obj), surface_of_solids=True),
     ".ply": _Format(1, 2, 3, f"{_LOW}, {_SOLIDS}", _text(_ply), surface_of_solids=True),
     ".stl": _Format(2, 2, 3, f"surfaces, {_SOLIDS}", _stl, surface_of_solids=True),
+    ".3mf": _Format(2, 2, 3, f"surfaces, {_SOLIDS}", _three_mf, surface_of_solids=True),
+    ".glb": _Format(2, 2, 3, f"surfaces, {_SOLIDS}", _glb, surface_of_solids=True),
     ".msh": _Format(1, 3, 3, _CELLULAR, _text(_msh)),
     ".vtu": _Format(1, 3, _ANY, _CELLULAR, _text(_vtu_lines)),
+    ".npz": _Format(0, _ANY, _ANY, "anything", npz.contents),
     **{
         ending: _Format(
             form.least_dimension,

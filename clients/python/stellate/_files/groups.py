@@ -55,7 +55,7 @@ def groups(mesh: Complex, cells: np.ndarray) -> list[Group]:
         found = [
             Group(
                 number,
-                "inside" if is_all else _region_name(label, mesh.region_names),
+                "inside" if is_all else region_name(label, mesh.region_names),
                 (),
                 cells[labels == label],
                 label,
@@ -72,11 +72,13 @@ def groups(mesh: Complex, cells: np.ndarray) -> list[Group]:
                     rows, on = _turned(rows, region.simplices)
                     if sides is not None:
                         sides[on, 1], sides[on, 0] = sides[on, 0], region.label
-            found.append(Group(len(found) + 1, _name(face.walls), face.walls, rows, sides=sides))
+            found.append(
+                Group(len(found) + 1, wall_name(face.walls), face.walls, rows, sides=sides)
+            )
     return found
 
 
-def _region_name(label: int, names: tuple[str, ...]) -> str:
+def region_name(label: int, names: tuple[str, ...]) -> str:
     """A name without what formats take for something else: .obj has spaces between names of groups,
     .msh quotes around them. "region_1" where there is none, or another region has it, too."""
     clean = ["".join("_" if c in ' "\\' else c for c in name) for name in names]
@@ -98,7 +100,8 @@ def label_data(every: list[Group]) -> dict[str, list[np.ndarray]]:
     }
 
 
-def _name(walls: tuple[int, ...]) -> str:
+def wall_name(walls: tuple[int, ...]) -> str:
+    """ "wall_0", "walls_0_1", ..."""
     return f"wall{'s' if len(walls) > 1 else ''}_" + "_".join(map(str, walls))
 
 
@@ -115,7 +118,9 @@ def _boundary_groups(mesh: Complex, cells: np.ndarray, labels: np.ndarray) -> li
             if dimension == mesh.dimension:
                 on = bits == sum(1 << wall for wall in face.walls)
                 rows, sides = cells[on], every[on]
-            found.append(Group(len(found) + 1, _name(face.walls), face.walls, rows, sides=sides))
+            found.append(
+                Group(len(found) + 1, wall_name(face.walls), face.walls, rows, sides=sides)
+            )
     return found
 
 

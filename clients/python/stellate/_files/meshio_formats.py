@@ -24,16 +24,18 @@ class MeshioFormat:
       point_data: whether it holds more numbers for each point than its coordinates, and, of a mesh
         with boundary, its faces beside its simplices with numbers for each.
       package: that meshio needs for it.
+      facets: whether the boundary's facets go into a file of their own beside it; see as_pair.
     """
 
     name: str
     least_dimension: int = 1
     point_data: bool = False
     package: str | None = None
+    facets: bool = False
     options: Mapping[str, Any] = dataclasses.field(default_factory=dict)
 
 
-_XDMF = MeshioFormat("xdmf", options={"data_format": "XML"})  # in one file
+_XDMF = MeshioFormat("xdmf", facets=True, options={"data_format": "XML"})  # without .h5 files
 
 FORMATS = {
     ".vtk": MeshioFormat("vtk", point_data=True),
@@ -93,8 +95,33 @@ def as_meshio(mesh: Complex, cells: np.ndarray, faces: bool = True) -> Any:
     )
 
 
-def write(form: MeshioFormat, mesh: Complex, cells: np.ndarray, path: str) -> None:
-    """Writes a mesh with these oriented cells, that the format can hold, to a file."""
+def as_pair(mesh: Complex, cells: np.ndarray) -> tuple[Any, Any]:
+    """Two of meshio's meshes of the same points, in R^2 where d = 2, as FEniCS reads a mesh and the tags
+    of its facets: the cells, with "region", and the facets on walls, with "wall", the first one's number
+    plus 1 (0 is what has none). None in place of the second where there is no wall.
+    """
+    import meshio
+
+    points = np.ascontiguousarray(
+        mesh.points if mesh.ambient_dimension == 2 else in_space(mesh.points)
+    )
+    regions = np.ones(len(cells), dtype=np.int32)
+    if mesh.labels is not None and mesh.labels.ndim == 1:
+        regions = mesh.labels.astype(np.int32)
+    whole = meshio.Mesh(points, [(CELLS[mesh.dimension], cells)], cell_data={"region": [regions]})
+    every = [g for g in groups(mesh, cells) if g.walls and g.dimension == mesh.dimension - 1]
+    if not every:
+        return whole, None
+    tags = np.repeat([g.walls[0] + 1 for g in every], [len(g.simplices) for g in every])
+    rows = np.concatenate([g.simplices for g in every])
+    walls = {"wall": [tags.astype(np.int32)]}
+    return whole, meshio.Mesh(points, [(CELLS[mesh.dimension - 1], rows)], cell_data=walls)
+
+
+def write(
+    form: MeshioFormat, mesh: Complex, cells: np.ndarray, path: str, facets: str | None = None
+) -> None:
+    """Writes a mesh with these oriented cells, that the format can hold, to a file, or to two."""
     import meshio
 
     if len(cells) == 0:
@@ -103,8 +130,14 @@ def write(form: MeshioFormat, mesh: Complex, cells: np.ndarray, path: str) -> No
             "and .vtu hold points alone"
         )
     try:
-        whole = as_meshio(mesh, cells, form.point_data)
+        of_facets = None
+        if form.facets:
+            whole, of_facets = as_pair(mesh, cells)
+        else:
+            whole = as_meshio(mesh, cells, form.point_data)
         meshio.write(path, whole, form.name, **form.options)
+        if of_facets is not None and facets is not None:
+            meshio.write(facets, of_facets, form.name, **form.options)
     except Exception as error:  # meshio has no base class for what its writers raise
         if isinstance(error, OSError):
             raise
