@@ -9,13 +9,12 @@ false, or when fewer than 99 in 100 were certified.
 
 from __future__ import annotations
 
-import argparse
 import collections
 import dataclasses
 import sys
 import time
-from collections.abc import Iterable
 
+import command
 import numpy as np
 import stellate
 from families import FAMILIES, Case
@@ -125,42 +124,29 @@ def table(runs: list[Run]) -> str:
     return "\n".join(lines)
 
 
-def _run_all(
-    numbers: Iterable[int], families: list[str], given: argparse.Namespace, runs: list[Run]
-) -> None:
-    """Adds to runs, and prints what was not right."""
-    with stellate.Server() as server:
-        for number in numbers:
-            family = families[number % len(families)]
-            run = one(family, number, given.seed, server)
-            runs.append(run)
-            if run.outcome != "right" or given.verbose or given.case is not None:
-                only = "".join(f" --family {name!r}" for name in given.family or ())
-                print(
-                    f"{family}: {run.outcome}{', boundary alone' if run.alone else ''}, epsilon "
-                    f"{run.share:.3f}, {run.seconds:.1f} s (--seed {given.seed}{only} --case {number})"
-                    f"{': ' if run.words else ''}{run.words}",
-                    flush=True,
-                )
-
-
 def main() -> int:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--runs", type=int, default=300, help="how many (300)")
-    parser.add_argument("--seed", type=int, default=1, help="of all that is random (1)")
+    parser = command.parser(__doc__, 300, "how many (300)")
     parser.add_argument("--family", action="append", choices=FAMILIES, help="these alone")
-    parser.add_argument("--case", type=int, help="the one run of this number, with its words")
     parser.add_argument("--verbose", action="store_true", help="a line for each run")
     given = parser.parse_args()
     families = given.family or [name for name in FAMILIES if name not in _LATE]
     numbers = range(given.runs) if given.case is None else [given.case]
-    runs: list[Run] = []
-    try:
-        _run_all(numbers, families, given, runs)
-    except KeyboardInterrupt:
-        print("interrupted: what there is")
+
+    def mesh(number: int, server: stellate.Server) -> Run:
+        return one(families[number % len(families)], number, given.seed, server)
+
+    def show(number: int, run: Run) -> None:
+        if run.outcome == "right" and not given.verbose and given.case is None:
+            return
+        only = "".join(f" --family {name!r}" for name in given.family or ())
+        print(
+            f"{run.family}: {run.outcome}{', boundary alone' if run.alone else ''}, epsilon "
+            f"{run.share:.3f}, {run.seconds:.1f} s (--seed {given.seed}{only} --case {number})"
+            f"{': ' if run.words else ''}{run.words}",
+            flush=True,
+        )
+
+    runs = command.run_all(numbers, mesh, show)
     print(table(runs))
     right = sum(run.outcome == "right" for run in runs)
     false = sum(run.outcome == "false" for run in runs)

@@ -10,7 +10,6 @@ share of what the level set bends and of what the sheet is thick, sampled; so th
 
 from __future__ import annotations
 
-import argparse
 import collections
 import dataclasses
 import itertools
@@ -18,6 +17,7 @@ import sys
 import time
 from typing import Any
 
+import command
 import numpy as np
 import scipy.ndimage
 import stellate
@@ -363,26 +363,8 @@ def table(runs: list[Run]) -> str:
     return "\n".join(lines)
 
 
-def _run_all(cases: list[tuple[int, Any]], given: argparse.Namespace, runs: list[Run]) -> None:
-    """Adds to runs, and prints each."""
-    with stellate.Server() as server:
-        for number, case in cases:
-            run = one(*case, given.seed, given.places, server)
-            runs.append(run)
-            print(
-                f"{number:4d} {run.surface}, {run.kind}, {run.place}, {run.fraction:g}, walls at "
-                f"{run.meeting:.0f} degrees: {run.outcome}, "
-                f"{run.vertices} vertices, {run.seconds:.1f} s{': ' if run.words else ''}{run.words}",
-                flush=True,
-            )
-
-
 def main() -> int:
-    parser = argparse.ArgumentParser(
-        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
-    )
-    parser.add_argument("--runs", type=int, help="so many, spread over all (all)")
-    parser.add_argument("--seed", type=int, default=1, help="of places and turns (1)")
+    parser = command.parser(__doc__, None, "so many, spread over all (all)")
     parser.add_argument("--surface", action="append", choices=SURFACES, help="these alone")
     parser.add_argument("--kind", action="append", choices=KINDS)
     parser.add_argument("--within", action="append", choices=PLACES)
@@ -393,7 +375,6 @@ def main() -> int:
         default=3,
         help="of so many random ones that of the largest angles (3)",
     )
-    parser.add_argument("--case", type=int, help="the one run of this number")
     given = parser.parse_args()
     fractions = [float(f) for f in given.fractions.split(",")]
     cases = list(
@@ -401,14 +382,22 @@ def main() -> int:
             given.surface or SURFACES, given.kind or KINDS, given.within or PLACES, fractions
         )
     )
-    numbers = list(np.random.default_rng(1).permutation(len(cases)))[: given.runs]
+    numbers = np.random.default_rng(1).permutation(len(cases)).tolist()[: given.runs]
     if given.case is not None:
         numbers = [given.case]
-    runs: list[Run] = []
-    try:
-        _run_all([(number, cases[number]) for number in numbers], given, runs)
-    except KeyboardInterrupt:
-        print("interrupted: what there is")
+
+    def mesh(number: int, server: stellate.Server) -> Run:
+        return one(*cases[number], given.seed, given.places, server)
+
+    def show(number: int, run: Run) -> None:
+        print(
+            f"{number:4d} {run.surface}, {run.kind}, {run.place}, {run.fraction:g}, walls at "
+            f"{run.meeting:.0f} degrees: {run.outcome}, "
+            f"{run.vertices} vertices, {run.seconds:.1f} s{': ' if run.words else ''}{run.words}",
+            flush=True,
+        )
+
+    runs = command.run_all(numbers, mesh, show)
     print(table(runs))
     return 1 if any(run.outcome == "false" for run in runs) else 0
 
