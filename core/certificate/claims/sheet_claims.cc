@@ -7,6 +7,7 @@
 #include <numeric>
 #include <utility>
 
+#include "core/base/dense.h"
 #include "core/base/message.h"
 #include "core/base/parallel.h"
 #include "core/base/random.h"
@@ -34,7 +35,8 @@ constexpr double kApart = 0.25;  // of the mesh size: what is nearer is in the s
 // In mesh sizes: so near to a wall the distance from the wall's mesh is a poor estimate of that
 // from the wall.
 constexpr double kBeside = 0.15;
-constexpr double kAfar = 4;  // of the largest radius of the mesh's simplices
+constexpr double kLessRounding = 1 - 0x1p-40;  // some thousand roundings of a squared distance
+constexpr double kAfar = 4;                    // of the largest radius of the mesh's simplices
 
 // Returns the squared distance of y from a simplex: from the nearest of the faces above or below
 // which y lies.
@@ -68,6 +70,18 @@ double SquaredDistanceFrom(const MeshView& mesh, const std::uint32_t* ids, int c
     if (is_inside && rest >= 0) nearest = std::min(nearest, std::max(away2, 0.0));
   }
   return nearest;
+}
+
+// Appends an orthonormal basis of the simplex's flat.
+void AppendDirections(const MeshView& mesh, const std::uint32_t* ids, int count,
+                      std::vector<double>* directions) {
+  if (count == 1) return;
+  Eigen::MatrixXd edges(mesh.d, count - 1);
+  for (int r = 0; r + 1 < count; ++r)
+    for (int i = 0; i < mesh.d; ++i)
+      edges(i, r) = mesh.Point(ids[r + 1])[i] - mesh.Point(ids[0])[i];
+  const Eigen::MatrixXd basis = OrthonormalBasis(edges, count - 1);
+  directions->insert(directions->end(), basis.data(), basis.data() + basis.size());
 }
 
 // Returns at most `most` of them, evenly spread.
@@ -170,6 +184,7 @@ std::unique_ptr<SheetClaims::Sheet> SheetClaims::SheetOf(int wall) const {
     double radius = 0;
     for (std::size_t i = 0; i < width; ++i)
       radius = std::max(radius, (x_.Vertex(ids[i]) - barycentre).norm());
+    AppendDirections(x_.mesh, ids, static_cast<int>(width), &sheet->directions);
     sheet->barycentres.insert(sheet->barycentres.end(), barycentre.begin(), barycentre.end());
     if (!faces_are_known) {
       const Eigen::VectorXd outward = OutwardAt(ids, sheet->sides[s / width]);
@@ -248,6 +263,24 @@ QueryBlock SheetClaims::QuestionsOf(std::size_t wall, Eigen::MatrixXd points) co
   return block;
 }
 
+// Returns a lower bound of the squared distance from a simplex of the wall's mesh, of which y is
+// `squared` from the barycentre: the simplex lies in a disc around that, in its own flat. So a
+// large plane side is searched at the foot of y and not over all that is about as far.
+double SheetClaims::SquaredBoundFrom(const Sheet& sheet, std::uint32_t f, const double* y,
+                                     double squared) const {
+  const int d = x_.mesh.d, along = x_.mesh.k - 1;
+  const double* barycentre = sheet.barycentres.data() + f * static_cast<std::size_t>(d);
+  const double* direction = sheet.directions.data() + f * static_cast<std::size_t>(along * d);
+  double in_flat2 = 0;
+  for (int r = 0; r < along; ++r, direction += d) {
+    double step = 0;
+    for (int i = 0; i < d; ++i) step += direction[i] * (y[i] - barycentre[i]);
+    in_flat2 += step * step;
+  }
+  const double beyond = std::max(0.0, std::sqrt(in_flat2) - sheet.radii[f]);
+  return (squared - in_flat2 + beyond * beyond) * kLessRounding;
+}
+
 // Returns the distance from the mesh of the wall; infinity if it has none.
 double SheetClaims::DistanceFrom(const Sheet& sheet, const double* y) const {
   const auto width = static_cast<std::size_t>(x_.mesh.k);
@@ -256,6 +289,7 @@ double SheetClaims::DistanceFrom(const Sheet& sheet, const double* y) const {
       y, [&] { return best + sheet.largest_radius; },
       [&](std::uint32_t f, double squared) {
         if (std::sqrt(squared) - sheet.radii[f] >= best) return;
+        if (SquaredBoundFrom(sheet, f, y, squared) >= best * best) return;
         const std::uint32_t* ids = sheet.simplices.data() + f * width;
         best = std::min(best, std::sqrt(SquaredDistanceFrom(x_.mesh, ids, x_.mesh.k, y)));
       });

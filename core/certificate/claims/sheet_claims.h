@@ -52,6 +52,7 @@ class SheetClaims {
     std::vector<double> outward;             // d each: out of the mesh, within the tangent space of
                                              // the simplex that ends there
     std::vector<double> radii;               // around the barycentres
+    std::vector<double> directions;          // k - 1 of d numbers each: orthonormal, along it
     std::vector<std::pair<int, int>> sides;  // as of FaceMesh
     double largest_radius = 0;
     BallTree tree;  // of the barycentres, by these radii
@@ -64,6 +65,8 @@ class SheetClaims {
   std::vector<std::uint32_t> Spread(const Sheet& sheet, const Eigen::MatrixXd& barycentres,
                                     const std::vector<double>& radii) const;
   double DistanceFrom(const Sheet& sheet, const double* y) const;
+  double SquaredBoundFrom(const Sheet& sheet, std::uint32_t f, const double* y,
+                          double squared) const;
   void TakeShares(std::size_t wall);
   std::vector<std::uint32_t> Dips(const Sheet& sheet, const BallTree& tree) const;
   QueryBlock QuestionsOf(std::size_t wall, Eigen::MatrixXd points) const;
