@@ -36,17 +36,29 @@ class Marking(manifolds.Torus):
 
 @pytest.fixture
 def shell(tmp_path, repository):
-    """Runs the command line in a folder with shapes.py."""
+    """Starts the command line in a folder with shapes.py, and waits for its end."""
     (tmp_path / "shapes.py").write_text(SHAPES)
-    environment = {**os.environ, "PYTHONPATH": str(repository / "clients" / "python")}
+    client = str(repository / "clients" / "python")
+    environment = {**os.environ, "PYTHONPATH": client, "PYTHONFAULTHANDLER": "1"}
 
-    def run(*arguments, start=subprocess.run, **more):
-        return start(
+    def run(*arguments, wait=True, **more):
+        running = subprocess.Popen(
             [sys.executable, "-m", "stellate", *map(str, arguments)], cwd=tmp_path,
             env={**environment, **more}, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
         )  # fmt: skip
+        return ended(running) if wait else running
 
     return run
+
+
+def ended(running, seconds=300):
+    """What a command has printed when it ends. One that hangs shows where all its threads are."""
+    try:
+        output, complaints = running.communicate(timeout=seconds)
+    except subprocess.TimeoutExpired:
+        running.send_signal(signal.SIGABRT)
+        pytest.fail(f"{running.args} hangs:\n{running.communicate(timeout=20)}")
+    return subprocess.CompletedProcess(running.args, running.returncode, output, complaints)
 
 
 def test_mesh_writes_what_was_asked_for(shell, tmp_path):
@@ -70,14 +82,14 @@ def test_an_uncertified_mesh_exits_one(shell):
 
 def test_ctrl_c_keeps_what_there_is(shell, tmp_path):
     command = ["mesh", "shapes:Slow", "-e", "0.05", "-o", "part.txt"]
-    with shell(*command, start=subprocess.Popen) as running:
-        for line in running.stderr:
-            if "refining" in line:
-                break
-        running.send_signal(signal.SIGINT)
-        output, complaints = running.communicate(timeout=100)
-    assert running.returncode == 1, complaints
-    assert "NOT CERTIFIED" in output and "Traceback" not in complaints
+    running = shell(*command, wait=False)
+    for line in running.stderr:
+        if "refining" in line:
+            break
+    running.send_signal(signal.SIGINT)
+    stopped = ended(running)
+    assert stopped.returncode == 1, stopped.stderr
+    assert "NOT CERTIFIED" in stopped.stdout and "Traceback" not in stopped.stderr
     assert len(stellate.load_txt(tmp_path / "part.txt").points) > 0
 
 
@@ -150,10 +162,16 @@ def test_programs_serve_what_was_declared(shell, server, repository):
         (["frobnicate"], "invalid choice"),
     ],
 )
-def test_refusals_exit_two(arguments, words, shell, server):
+def test_refusals_exit_two(arguments, words, shell, server, tmp_path, monkeypatch, capsys):
+    # In this process, as test_help. `shell` has written shapes.py.
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.syspath_prepend(tmp_path)
     at = ["--server", server.address] if arguments[0] != "frobnicate" else []
-    refused = shell(*arguments, *at)
-    assert refused.returncode == 2 and words in refused.stderr, refused
+    try:
+        status = main([*arguments, *at])
+    except SystemExit as refused:
+        status = refused.code
+    assert status == 2 and words in capsys.readouterr().err
 
 
 def test_failures_exit_three(shell):
