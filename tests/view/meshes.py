@@ -64,6 +64,7 @@ SHAPES = {
     "torus": lambda: manifolds.Torus(1.0, 0.4),
     "thin torus": lambda: manifolds.Torus(1.0, 0.12),
     "two spheres": TwoSpheres,
+    "rotations": manifolds.SpecialOrthogonal3,
     "flat torus": lambda: manifolds.ProductOfCircles([1.0, 1.0, 1.0]),
     "octant": lambda: oracles.Clipped(
         manifolds.Sphere(2), box=([0.0, 0.0, 0.0], [np.inf, np.inf, np.inf])

@@ -109,8 +109,11 @@ export class Stage {
     return { process: process_, url: url.href, port: url.port, secret: url.hash.slice(1), ended };
   }
 
-  async page(url, script = () => {}) {
-    const page = await this.browser.newPage({ viewport: { width: 1200, height: 760 } });
+  async page(url, script = () => {}, moves = false) {
+    // Meshes in more than three dimensions would turn by themselves.
+    const reducedMotion = moves ? "no-preference" : "reduce";
+    const viewport = { width: 1200, height: 760 };
+    const page = await this.browser.newPage({ viewport, reducedMotion });
     this.pages.push(page);
     page.requested = [];
     page.sockets = [];
@@ -131,9 +134,9 @@ export class Stage {
   }
 
   // A page with a gateway of its own: to that mesh, if there is one.
-  async look(name, script) {
+  async look(name, script, moves) {
     const gateway = await this.gateway(...(name ? [name] : []));
-    const page = await this.page(gateway.url, script);
+    const page = await this.page(gateway.url, script, moves);
     return Object.assign(page, { gateway });
   }
 

@@ -108,7 +108,7 @@ test("regions and the boundary alone are told by colour", async () => {
   await choose(page, "two materials");
   await finished(page);
   assert.equal(await page.locator("#colour").inputValue(), "region");
-  assert.equal(await page.locator("#part").inputValue(), "below", "what is inside is seen");
+  assert.equal(await page.locator("#part").inputValue(), "cut", "what is inside is seen");
   const legend = await page.locator("#walls span").allInnerTexts();
   assert.deepEqual(legend, ["region 1", "region 2"]);
   const regions = await hues(page);

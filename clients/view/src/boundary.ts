@@ -26,7 +26,8 @@ const kNone: Boundary = {
   parts: 0,
 };
 
-function wallsOf(store: MeshStore, ids: number[]): bigint {
+// As bits, those that all of these lie on.
+export function wallsOf(store: MeshStore, ids: number[]): bigint {
   return ids.reduce((walls, id) => walls & (store.walls.get(id) ?? 0n), ~0n);
 }
 

@@ -8,8 +8,10 @@ export type Option = [value: string, text: string];
 
 const subscript = (n: number) => `${n}`.replace(/\d/g, (digit) => "₀₁₂₃₄₅₆₇₈₉"[Number(digit)]);
 
+export const coordinateName = (i: number) => `x${subscript(i + 1)}`;
+
 export const coordinates = (d: number): Option[] =>
-  Array.from({ length: d }, (_, i) => [`${i}`, `x${subscript(i + 1)}`]);
+  Array.from({ length: d }, (_, i) => [`${i}`, coordinateName(i)]);
 
 export interface Choices {
   parts: Option[];
@@ -23,6 +25,7 @@ function partsOf(k: number, solid: boolean): Option[] {
   if (k === 2) {
     return [
       ["whole", "all of it"],
+      ["cut", "cut open"],
       ["below", "a part"],
       ["slice", "a slice"],
     ];
@@ -34,7 +37,12 @@ function partsOf(k: number, solid: boolean): Option[] {
     ];
   }
   return [
-    ...(solid ? [["boundary", "the boundary"] as Option] : []),
+    ...(solid
+      ? ([
+          ["boundary", "the boundary"],
+          ["cut", "cut open"],
+        ] as Option[])
+      : []),
     ["slice", "a slice"],
     ["below", solid ? "a part" : "a shell"],
     ["whole", "all edges"],
@@ -57,7 +65,7 @@ export function choicesOf({ k, d, walls, regions, boundaryOnly, places }: MeshRo
   ];
   // What lies over itself when coordinates are left out does so less from an oblique side.
   // Of several regions those inside are to be seen, too.
-  const part: Part = several && solid ? "below" : (parts[0][0] as Part);
+  const part: Part = several && solid ? "cut" : (parts[0][0] as Part);
   const axis = Math.min(3, d - 1); // along an axis of the picture a slice would be seen edge on
   const seen = part === "slice" ? d - 1 : d; // dimensions of what holds what is seen
   const oblique = seen > 3;

@@ -1,7 +1,7 @@
 // Where a mesh is at fault, on the screen.
 import type { Look } from "./look";
 import type { FromWorker, Scene } from "./messages";
-import { extent } from "./shape";
+import { extent } from "./paint";
 import type { MeshStore } from "./store";
 
 export interface Faults {
@@ -78,6 +78,17 @@ export function marksOf(store: MeshStore, projected: Float32Array, faults: Fault
     chosen: there(faults.chosen),
     chosenEdges: there(faults.chosen.length > 0 ? starEdges(store, faults.chosen) : []),
   };
+}
+
+// Of a vertex or a simplex.
+export function pinOf(
+  store: MeshStore,
+  projected: Float32Array,
+  ids: number[],
+): Pick<Scene, "pinned" | "pinnedEdges"> {
+  const known = ids.filter((id) => id < store.vertices);
+  const marks = marksOf(store, projected, { all: [known], chosen: [] });
+  return { pinned: marks.faults, pinnedEdges: marks.faultEdges };
 }
 
 type Flight = Extract<FromWorker, { type: "fly" }>;

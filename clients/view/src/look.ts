@@ -1,6 +1,6 @@
 // What is to be seen of a mesh: by which axes, which part, coloured by what.
 
-export type Part = "whole" | "slice" | "below" | "boundary";
+export type Part = "whole" | "slice" | "cut" | "below" | "boundary";
 export type Colour =
   "plain" | "order" | "coordinate" | "size" | "shape" | "wall" | "region" | "place";
 
@@ -22,6 +22,13 @@ export interface Shape {
   values: Float32Array; // of each vertex, as the palette says; NaN: plain
   palette: Palette;
   index: Uint32Array | null;
+  cells: ArrayLike<number> | null; // of each triangle or segment, the simplex; null: in their order
+}
+
+// What the colour map says from end to end.
+export interface Scale {
+  low: number;
+  high: number;
 }
 
 // Where a mesh with boundary ends: curves by wall, and corners.
@@ -36,6 +43,7 @@ export interface Rim {
 export interface Bare {
   positions: Float32Array; // 3 a vertex
   values: Float32Array; // 0..1: when it came; or its place
+  ids: number[]; // of each
   palette: Palette;
 }
 

@@ -2,9 +2,12 @@
 import "./style.css";
 import "./stage.css";
 import { Curves, Histograms } from "./charts";
-import { choicesOf, coordinates } from "./choices";
+import { choicesOf, coordinateName, coordinates } from "./choices";
+import { Inspector } from "./inspector";
+import { listenToKeys } from "./keys";
 import { axesFrame, Tour, type Colour, type Look, type Part } from "./look";
-import type { FaultKind, FromWorker, MeshRow, Told, ToWorker } from "./messages";
+import type { FaultKind, Format, FromWorker, MeshRow, Told, ToWorker } from "./messages";
+import { Overlay } from "./overlay";
 import {
   badgeOf,
   drawWorkers,
@@ -18,6 +21,7 @@ import {
   superscript,
 } from "./panels";
 import { Leader } from "./leader";
+import { fileName, offer, pictureOf, saves } from "./saving";
 import { View } from "./scene";
 import type { Recording } from "./source";
 import { Time } from "./time";
@@ -63,6 +67,14 @@ function askToSee(message: Told): number {
 
 const view = new View(at<HTMLCanvasElement>("canvas"), at("look"));
 view.onBusy = tellBusy;
+listenToKeys(at("canvas"), view);
+const overlay = new Overlay(document.querySelector<SVGSVGElement>("#overlay")!, () => ({
+  text: css("--text"),
+  line: css("--dim"),
+  ground: css("--stage"),
+}));
+view.onFrame = (sight) => overlay.draw(sight);
+const inspector = new Inspector(at<HTMLCanvasElement>("canvas"), view, ask, askToSee);
 
 // Whether something else is about to be seen.
 function tellBusy() {
@@ -119,6 +131,7 @@ function choose(name: string) {
   mesh = null;
   leaveFault();
   stopTour();
+  inspector.reset();
   time.reset();
   leader.reset();
   boundary = "";
@@ -157,6 +170,7 @@ function meet(row: MeshRow) {
   at("wires-box").hidden = row.k === 1;
   fill("axis", coordinates(row.d), `${look.axis}`);
   fillColours(row);
+  fill("save", saves(row), "");
   [0, 1, 2].forEach((axis) =>
     fill(
       `axis-${axis}`,
@@ -167,6 +181,22 @@ function meet(row: MeshRow) {
   at("axes-box").hidden = row.d <= 3;
   setParts();
   askToSee({ type: "look", name: chosen, look });
+  // From one side alone, what has more dimensions lies over itself.
+  if (row.d > 3 && !matchMedia("(prefers-reduced-motion: reduce)").matches) startTour();
+}
+
+// What the colour map says.
+function colourName(): string {
+  if (look.colour === "coordinate") return coordinateName(look.colourAxis);
+  return at<HTMLSelectElement>("colour").selectedOptions[0]?.textContent ?? "";
+}
+
+function startTour() {
+  if (mesh === null) return;
+  const still = look.part === "slice" ? [look.axis] : []; // or it would be seen edge on
+  tour = { tour: new Tour(mesh.d, look.frame, still), start: performance.now() };
+  at<HTMLInputElement>("tour").checked = true;
+  for (const id of ["axis-0", "axis-1", "axis-2"]) at<HTMLSelectElement>(id).value = "";
 }
 
 function stopTour() {
@@ -190,6 +220,7 @@ function setParts() {
 function changeLook(change: Partial<Look>) {
   if (mesh === null) return; // there is nothing to look at yet, and its first look comes with it
   look = { ...look, ...change };
+  if (tour && (change.part !== undefined || change.axis !== undefined)) startTour();
   setParts();
   askToSee({ type: "look", name: chosen, look });
 }
@@ -220,14 +251,25 @@ for (const id of ["axis-0", "axis-1", "axis-2"]) {
   };
 }
 at<HTMLInputElement>("tour").onchange = (e) => {
-  const on = (e.target as HTMLInputElement).checked;
-  tour = on && mesh ? { tour: new Tour(mesh.d, look.frame), start: performance.now() } : null;
-  if (!on) return;
-  for (const id of ["axis-0", "axis-1", "axis-2"]) at<HTMLSelectElement>(id).value = "";
+  if ((e.target as HTMLInputElement).checked) startTour();
+  else stopTour();
 };
 at<HTMLInputElement>("wires").onchange = (e) =>
   view.setWires((e.target as HTMLInputElement).checked);
 at("fit").onclick = () => view.refit();
+at<HTMLSelectElement>("save").onchange = (e) => {
+  const select = e.target as HTMLSelectElement;
+  const wish = select.value;
+  select.value = "";
+  if (wish === "png") void savePicture();
+  else ask({ type: "save", format: wish as Format });
+};
+async function savePicture() {
+  if (mesh === null) return;
+  const svg = document.querySelector<SVGSVGElement>("#overlay")!;
+  const name = fileName(mesh, "png");
+  offer(name, await pictureOf(at<HTMLCanvasElement>("canvas"), svg, at("walls")));
+}
 setInterval(() => {
   if (tour && !document.hidden) {
     changeLook({ frame: tour.tour.at((performance.now() - tour.start) / 1000) });
@@ -283,6 +325,7 @@ function drawFacts() {
   if (!mesh.over && mesh.remaining > 0) items.push(fact("left, about", seconds(mesh.remaining)));
   if (!mesh.over) items.push(fact("phase", mesh.phase));
   facts.replaceChildren(...items);
+  at("canvas").setAttribute("aria-label", items.map((item) => item.textContent).join(", "));
   document.title = `${mesh.label || shortName(mesh.name)} – Stellate`;
 }
 
@@ -332,7 +375,13 @@ const hear: { [T in FromWorker["type"]]: (m: Extract<FromWorker, { type: T }>) =
   },
   verdict: ({ verdict }) => drawVerdict(at("verdict"), verdict, fly, flyTo),
   histograms: (message) => histograms.show(message.histograms),
-  fly: ({ centre, radius, normal, level, text }) => {
+  found: ({ found, pin }) => inspector.hear(found, pin),
+  saved: ({ format, file, message }) => {
+    if (file && mesh) offer(fileName(mesh, format), file);
+    else at("revision-text").textContent = message;
+  },
+  fly: ({ centre, radius, normal, level, text, found }) => {
+    if (found) return view.flyTo(centre, radius, normal);
     if (!fault) return;
     at("fault").hidden = false;
     at("fault").querySelector("span")!.textContent =
@@ -356,6 +405,7 @@ const hear: { [T in FromWorker["type"]]: (m: Extract<FromWorker, { type: T }>) =
     }
     const plain = css(mesh?.k === 1 ? "--curve" : "--mesh");
     view.show(scene, plain, css("--text"), mesh?.k === 1);
+    overlay.show(look.frame, { name: colourName(), scale: scene.scale });
   },
 };
 view.onDrawn = (scene) => {

@@ -1,5 +1,5 @@
 // What the page and its worker say to each other.
-import type { Bare, Look, Rim, Shape } from "./look";
+import type { Bare, Look, Rim, Scale, Shape } from "./look";
 import type { Histogram } from "./measure";
 import type { Recording } from "./source";
 
@@ -55,6 +55,21 @@ export type FaultKind = "faces" | "links" | "stars" | "inconsistent" | "fibres";
 // What is looked at: one of those that the certificate names, or what its words name.
 export type Fault = { kind: FaultKind; chosen: number } | { ids: number[] };
 
+// What is looked for under the pointer, in the picture's space. A pixel at distance t from the origin is
+// t * pixel wide.
+export interface Ray {
+  origin: [number, number, number];
+  direction: [number, number, number]; // of length 1
+  pixel: number;
+}
+
+// A vertex or a simplex, and what is known of it.
+export interface Found {
+  ids: number[];
+  title: string;
+  rows: [name: string, text: string][];
+}
+
 // A line of the certificate; with faults, it leads to them.
 export interface Claim {
   title: string;
@@ -83,8 +98,13 @@ export type Told =
   | { type: "revision"; revision: number | null } // null: the newest, as it comes
   | { type: "look"; name: string; look: Look } // at that mesh: others may have other dimensions
   | { type: "faults"; fault: Fault | null }
+  | { type: "pick"; ray: Ray; pin: boolean } // pinned: stays marked
+  | { type: "find"; ids: number[] } // pins it, and flies there; none: nothing is pinned
+  | { type: "save"; format: Format }
   | { type: "measure" }
   | { type: "drawn" };
+
+export type Format = "txt" | "obj" | "vtu";
 
 export interface Scene {
   type: "scene";
@@ -102,6 +122,9 @@ export interface Scene {
   faultEdges: Float32Array; // pairs of positions
   chosen: Float32Array; // of the fault that was chosen
   chosenEdges: Float32Array; // pairs of positions, of the simplices about it
+  pinned: Float32Array; // positions of the vertices of what is pinned
+  pinnedEdges: Float32Array; // pairs of positions
+  scale: Scale | null; // of the colours
   // The smallest ball about the middle that holds the mesh, from whatever side it is seen.
   centre: [number, number, number];
   radius: number;
@@ -126,6 +149,9 @@ export type Said =
       normal: [number, number, number]; // zero: none
       level: number;
       text: string;
+      found?: boolean; // it was looked for by number, and is no fault
     }
+  | { type: "found"; found: Found | null; pin: boolean }
+  | { type: "saved"; format: Format; file: Blob | null; message: string } // null: why, in words
   | { type: "loading"; text: string }
   | Scene;

@@ -32,8 +32,43 @@ function cut(store: MeshStore, look: Look, projected: Float32Array): Rim {
   };
 }
 
+// As much of these segments as is below; `height` of their ends tells.
+function clipped(
+  segments: number[][],
+  projected: Float32Array,
+  height: (v: number) => number,
+): { ids: number[]; ends: number[] }[] {
+  return segments.flatMap((ids) => {
+    const [p, q] = height(ids[0]) < 0 ? ids : [ids[1], ids[0]];
+    if (height(p) >= 0) return [];
+    const t = height(q) < 0 ? 1 : height(p) / (height(p) - height(q));
+    const from = [...projected.subarray(3 * p, 3 * p + 3)];
+    const to = from.map((x, i) => (1 - t) * x + t * projected[3 * q + i]);
+    return [{ ids, ends: [...from, ...to] }];
+  });
+}
+
+// Of what is cut open: the rim as far as it is left, and that of the cut.
+function cutRim(store: MeshStore, look: Look, projected: Float32Array): Rim {
+  const height = heightOf(store, look);
+  const boundary = boundaryOf(store);
+  const left = clipped(rows(boundary.segments, 2), projected, height);
+  const points = boundary.points.filter((v) => height(v) < 0);
+  const across = store.k === 3 ? cut(store, look, projected) : null;
+  return {
+    segments: Float32Array.from([...left.flatMap(({ ends }) => ends), ...(across?.segments ?? [])]),
+    walls: Uint8Array.from([
+      ...left.map(({ ids }) => wallOf(store, ids)),
+      ...(across?.walls ?? []),
+    ]),
+    points: Float32Array.from(points.flatMap((v) => [...projected.subarray(3 * v, 3 * v + 3)])),
+    pointWalls: Uint8Array.from(points.map((v) => wallOf(store, [v]))),
+  };
+}
+
 export function rimOf(store: MeshStore, look: Look, projected: Float32Array): Rim {
   if (look.part === "slice" && store.k === 3) return cut(store, look, projected);
+  if (look.part === "cut" && store.k < 4) return cutRim(store, look, projected);
   const height = heightOf(store, look);
   const seen = (ids: number[]) =>
     look.part === "whole" ||

@@ -12,6 +12,8 @@ import {
   PerspectiveCamera,
   Raycaster,
   Scene as ThreeScene,
+  Spherical,
+  Vector2,
   Vector3,
   WebGLRenderer,
 } from "three";
@@ -19,11 +21,11 @@ import { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 import { kSeveral } from "./boundary";
 import { Dots, ThickLines } from "./marks";
 import { paletteColour, wallColour, type Shape } from "./look";
-import type { Scene } from "./messages";
+import type { Ray, Scene } from "./messages";
 import { roughIndex } from "./rough";
 
 // Viridis at a few places; between them straight.
-const kMap = ["#440154", "#414487", "#2a788e", "#22a884", "#7ad151", "#fde725"].map(
+export const kMap = ["#440154", "#414487", "#2a788e", "#22a884", "#7ad151", "#fde725"].map(
   (c) => new Color(c),
 );
 const kWhite = new Color("#ffffff");
@@ -36,6 +38,17 @@ export function colourAt(value: number, out: Color): Color {
   const place = Math.min(Math.max(value, 0), 1) * (kMap.length - 1);
   const i = Math.min(Math.floor(place), kMap.length - 2);
   return out.lerpColors(kMap[i], kMap[i + 1], place - i);
+}
+
+// Whence the mesh is seen, for what is drawn over it.
+export interface Sight {
+  width: number; // pixels, as all of these
+  height: number;
+  bottom: number; // above what stands on the lower end
+  pixels: number; // that a length of 1 has in the middle of the picture
+  right: [number, number, number];
+  up: [number, number, number];
+  empty: boolean; // there is nothing
 }
 
 export class View {
@@ -71,6 +84,8 @@ export class View {
   private readonly chosenEdges = new ThickLines({ width: 2.5, colour: "#ffb020", through: true });
   private readonly faults = new Dots({ size: 9, colour: "#d92d20", through: true });
   private readonly chosen = new Dots({ size: 15, colour: "#ffb020", through: true });
+  private readonly pinnedEdges = new ThickLines({ width: 3, colour: "#e11d9c", through: true });
+  private readonly pinned = new Dots({ size: 11, colour: "#e11d9c", through: true });
   private readonly all = new Group();
   private flat = false;
   private stood: Vector3 | null = null; // whence it was looked at, before flights that nobody ended by hand
@@ -84,6 +99,7 @@ export class View {
   private owed: Scene | null = null; // not drawn yet
   onDrawn: (scene: Scene) => void = () => {};
   onBusy: () => void = () => {}; // it is, or is no longer
+  onFrame: (sight: Sight) => void = () => {};
 
   // `over`: what stands on the lower end of the canvas, which meshes are fitted above.
   constructor(
@@ -122,6 +138,8 @@ export class View {
       this.faultEdges,
       this.chosen,
       this.faults,
+      this.pinnedEdges,
+      this.pinned,
     ];
     marks.forEach((mark, i) => (mark.object.renderOrder = i + 1));
     this.all.add(...marks.map((mark) => mark.object));
@@ -214,6 +232,8 @@ export class View {
     this.faultEdges.show(scene.faultEdges);
     this.faults.show(scene.faults);
     this.chosen.show(scene.chosen);
+    this.pinnedEdges.show(scene.pinnedEdges);
+    this.pinned.show(scene.pinned);
     this.ball = { centre: new Vector3(...scene.centre), radius: scene.radius };
     if (!this.fitted && scene.vertices > 0) this.fit();
     this.owed = scene;
@@ -237,6 +257,55 @@ export class View {
   refit() {
     this.fitted = false;
     this.fit();
+  }
+
+  // By hand: round the middle, as radians to the right and downwards.
+  turn(right: number, down: number) {
+    const way = this.camera.position.clone().sub(this.controls.target);
+    const place = new Spherical().setFromVector3(new Vector3(way.x, way.z, -way.y));
+    place.theta += right;
+    place.phi += down;
+    const { x, y, z } = new Vector3().setFromSpherical(place.makeSafe());
+    this.moveTo(new Vector3(x, -z, y));
+  }
+  // To so many times the distance.
+  approach(times: number) {
+    this.moveTo(this.camera.position.clone().sub(this.controls.target).multiplyScalar(times));
+  }
+  private moveTo(way: Vector3) {
+    this.flight = null;
+    this.stood = null;
+    this.fitted = true;
+    this.camera.position.copy(this.controls.target).add(way);
+    this.controls.update();
+    this.redraw();
+  }
+
+  // Through a place on the canvas, from its upper left corner.
+  rayAt(x: number, y: number): Ray {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const place = new Vector2((2 * x) / width - 1, 1 - (2 * y) / height);
+    const caster = new Raycaster();
+    caster.setFromCamera(place, this.camera);
+    const { origin, direction } = caster.ray;
+    const pixel = (2 * Math.tan((this.camera.fov * Math.PI) / 360)) / height;
+    return { origin: origin.toArray(), direction: direction.toArray(), pixel };
+  }
+
+  private get sight(): Sight {
+    const { clientWidth: width, clientHeight: height } = this.canvas;
+    const distance = this.camera.position.distanceTo(this.controls.target);
+    const along = (i: number) =>
+      new Vector3().setFromMatrixColumn(this.camera.matrixWorld, i).toArray();
+    return {
+      width,
+      height,
+      bottom: height - this.below,
+      pixels: height / (2 * distance * Math.tan((this.camera.fov * Math.PI) / 360)),
+      right: along(0),
+      up: along(1),
+      empty: !this.all.visible,
+    };
   }
 
   flyTo(centre: [number, number, number], radius: number, normal: [number, number, number]) {
@@ -311,6 +380,7 @@ export class View {
     this.camera.far = distance + 20 * this.ball.radius;
     this.camera.updateProjectionMatrix();
     renderer.render(this.scene, this.camera);
+    this.onFrame(this.sight);
     awaitDrawn(renderer.getContext());
     this.wires.visible = wires;
     if (!coarse) this.slow = 0.5 * this.slow + (0.5 * (performance.now() - began)) / 1000;

@@ -94,6 +94,11 @@ export class MeshStore {
     }
   }
 
+  // Of a simplex with these ids, ascending; -1: there is none.
+  cellOf(ids: number[]): number {
+    return ids.length === this.k + 1 ? this.table[this.find(Uint32Array.from(ids), 0)] : -1;
+  }
+
   private hash(cells: Uint32Array, at: number): number {
     let h = 0x811c9dc5;
     for (let i = 0; i <= this.k; i++) h = Math.imul(h ^ cells[at + i], 0x9e3779b1) ^ (h >>> 15);

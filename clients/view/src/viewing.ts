@@ -2,7 +2,7 @@
 import { create, fromBinary, toBinary } from "@bufbuild/protobuf";
 import { doubles, indices } from "./arrays";
 import { describe } from "./boundary";
-import { faultsIn, flightTo, marksOf, type Faults } from "./faults";
+import { faultsIn, flightTo, marksOf, pinOf, type Faults } from "./faults";
 import { MeshSchema, type Mesh, type MeshDelta } from "./generated/stellate/v1/mesh_pb";
 import {
   DownloadMeshRequestSchema,
@@ -11,12 +11,15 @@ import {
   WatchMeshRequestSchema,
   WatchMeshResponseSchema,
 } from "./generated/stellate/v1/stellate_pb";
-import type { Look } from "./look";
+import { fileOf } from "./formats";
+import type { Bare, Look, Shape } from "./look";
 import { histograms } from "./measure";
-import type { Fault, PastRow, Said, Scene } from "./messages";
+import type { Fault, Format, PastRow, Ray, Said, Scene } from "./messages";
 import { rimOf } from "./rim";
 import { report, send as say, sleep } from "./say";
-import { bareOf, extent, project, shapeOf } from "./shape";
+import { extent, scaleOf } from "./paint";
+import { describeFound, hitBy } from "./pick";
+import { bareOf, project, shapeOf } from "./shape";
 import type { Source } from "./source";
 import { MeshStore } from "./store";
 import { workersOf, faultsOf, isOver, pastOf, rowOf, simplexDimension, verdictOf } from "./verdict";
@@ -41,6 +44,9 @@ export class Viewing {
   private over = false;
   private fault: Fault | null = null;
   private flightDue = false; // to it, once it is there
+  private pinned: number[] = []; // ids of a vertex or a simplex
+  private seen: { store: MeshStore; shape: Shape; bare: Bare; projected: Float32Array } | null =
+    null;
   private due = false;
   private answered = 0; // as of ToWorker
   private waiting = false; // the page has not drawn the last scene yet
@@ -269,6 +275,38 @@ export class Viewing {
     return faultsIn(store, { ids: Uint32Array.from(ids), width: ids.length }, 0);
   }
 
+  // What is under the pointer, of what was drawn last.
+  pick(ray: Ray, pin: boolean) {
+    if (this.seen) {
+      const { store, shape, bare, projected } = this.seen;
+      this.tell(store, hitBy(ray, shape, bare, store, projected), pin);
+    }
+    if (pin) this.draw();
+  }
+
+  find(ids: number[]) {
+    this.draw();
+    const store = this.visible;
+    if (store === null) return;
+    this.tell(store, ids, true);
+    if (this.pinned.length === 0 || this.look === null) return;
+    const projected = project(store, this.look.frame);
+    const faults = { all: [], chosen: this.pinned };
+    const flight = flightTo(store, this.look, projected, this.largest, faults);
+    if (flight) this.send({ ...flight, found: true });
+  }
+
+  private tell(store: MeshStore, ids: number[], pin: boolean) {
+    const found = describeFound(store, ids, this.mesh?.spec?.epsilon ?? 0);
+    this.send({ type: "found", found, pin });
+    if (pin) this.pinned = found?.ids ?? [];
+  }
+
+  save(format: Format) {
+    const store = this.visible;
+    if (store) this.send({ type: "saved", format, ...fileOf(store, format) });
+  }
+
   drawn() {
     this.waiting = false;
     if (this.due) this.draw();
@@ -321,11 +359,12 @@ export class Viewing {
       drawn,
       boundary: describe(store),
       ...marksOf(store, projected, faults),
+      ...pinOf(store, projected, this.pinned),
+      scale: scaleOf(store, this.look, this.largest),
       ...ballOf(store, this.look),
     };
-    const buffers: Transferable[] = [shape.positions.buffer, shape.values.buffer];
-    if (shape.index) buffers.push(shape.index.buffer);
-    this.send(scene, buffers);
+    this.seen = { store, shape, bare, projected }; // the page gets a copy: the pointer asks for it
+    this.send({ ...scene, shape: { ...shape, cells: null } });
   }
 
   measure() {

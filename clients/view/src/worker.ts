@@ -67,6 +67,9 @@ const answers: { [T in Told["type"]]: (m: Extract<Told, { type: T }>) => unknown
     if (viewing?.name === name) viewing.lookAt(look);
   },
   faults: ({ fault }) => viewing?.choose(fault),
+  pick: ({ ray, pin }) => viewing?.pick(ray, pin),
+  find: ({ ids }) => viewing?.find(ids),
+  save: ({ format }) => viewing?.save(format),
   measure: () => viewing?.measure(),
   drawn: () => viewing?.drawn(),
 };
