@@ -41,26 +41,35 @@ core::Expected<std::unique_ptr<Journal>> Journal::Open(const JournalOptions& opt
   if (!directory) return tl::unexpected(std::move(directory.error()));
   auto opened = (*directory)->TakeJournal();
   if (!opened) return tl::unexpected(std::move(opened.error()));
-  JournalFile& file = **opened;
-  file.Limit(options.max_bytes);
-  const auto stored = file.TakeMeshes();
-  std::map<std::int64_t, std::uint64_t> bytes;
-  for (const auto& [id, mesh] : stored) bytes[id] = file.BytesOf(id);
+  (*opened)->Limit(options.max_bytes);
+  return Begin(std::move(*directory), std::move(*opened), options);
+}
+
+core::Expected<std::unique_ptr<Journal>> Journal::Over(std::unique_ptr<Records> records,
+                                                       const JournalOptions& options) {
+  return Begin(nullptr, std::move(records), options);
+}
+
+core::Expected<std::unique_ptr<Journal>> Journal::Begin(std::unique_ptr<DataDirectory> directory,
+                                                        std::unique_ptr<Records> records,
+                                                        const JournalOptions& options) {
+  const std::string where = directory == nullptr ? "the database" : directory->path();
+  const auto stored = records->TakeMeshes();
   std::unique_ptr<Journal> journal(new Journal(
-      std::make_shared<SharedJournal>(std::move(*directory), std::move(*opened)), options));
+      std::make_shared<SharedJournal>(std::move(directory), std::move(records)), options));
   for (const auto& [id, mesh] : stored) {
-    if (journal->Take(id, mesh, bytes[id])) continue;
+    if (journal->Take(id, mesh)) continue;
     return core::Refuse(core::StatusCode::kFailedPrecondition,
-                        core::Message("the journal in ", options.directory, " holds a mesh (", id,
+                        core::Message("the journal in ", where, " holds a mesh (", id,
                                       ") that makes no sense; it was left as it is: choose "
-                                      "another --data-dir"));
+                                      "another one"));
   }
-  journal->file_->StartThreads();
+  journal->shared_->StartThreads();
   return journal;
 }
 
-Journal::Journal(std::shared_ptr<SharedJournal> file, JournalOptions options)
-    : file_(std::move(file)), options_(std::move(options)) {}
+Journal::Journal(std::shared_ptr<SharedJournal> shared, JournalOptions options)
+    : shared_(std::move(shared)), options_(std::move(options)) {}
 
 std::optional<Refused> Journal::RefuseNewMesh(const std::string& owner, std::uint64_t bytes) const {
   const auto refuse = [](const char* setting, std::uint64_t limit, const char* scope,
@@ -70,19 +79,20 @@ std::optional<Refused> Journal::RefuseNewMesh(const std::string& owner, std::uin
                            "no longer needed, or raise --", setting));
   };
   if (options_.owner_bytes > 0 && !owner.empty() &&
-      file_->OwnerBytes(owner) + bytes > options_.owner_bytes) {
+      shared_->OwnerBytes(owner) + bytes > options_.owner_bytes) {
     return refuse(
         "owner-journal-bytes", options_.owner_bytes, "owner",
-        Message("the records of your meshes have ", file_->OwnerBytes(owner), " bytes of the ",
+        Message("the records of your meshes have ", shared_->OwnerBytes(owner), " bytes of the ",
                 options_.owner_bytes, " that the server allows each owner"));
   }
-  const std::uint64_t total = file_->TotalBytes();
+  const std::uint64_t total = shared_->TotalBytes();
   const std::uint64_t size = total + total / kOverhead + kEmptyFile;
   if (options_.max_bytes > 0 && size + bytes > options_.max_bytes) {
     return refuse("max-journal-bytes", options_.max_bytes, "server",
                   Message("the server's record has about ", size, " bytes of the ",
                           options_.max_bytes, " that it may have"));
   }
+  if (options_.directory.empty()) return std::nullopt;
   std::error_code error;
   const std::filesystem::space_info disk = std::filesystem::space(options_.directory, error);
   if (error || disk.available >= bytes) return std::nullopt;
@@ -92,12 +102,12 @@ std::optional<Refused> Journal::RefuseNewMesh(const std::string& owner, std::uin
 }
 
 // False: its records contradict each other.
-bool Journal::Take(std::int64_t id, const JournalFile::StoredMesh& stored, std::uint64_t bytes) {
+bool Journal::Take(std::int64_t id, const StoredMesh& stored) {
   SessionOptions options;
   SessionRecord record;
   const bool whole = DecodeStart(stored.start, &options.request, &record.create_time);
-  const auto place = std::make_shared<RecordedMesh>(file_, options_.owner_bytes, id, stored,
-                                                    options.request, bytes);
+  const auto place =
+      std::make_shared<RecordedMesh>(shared_, options_.owner_bytes, id, stored, options.request);
   if (stored.removed) {
     place->Forget();
     return true;
@@ -119,10 +129,10 @@ bool Journal::Take(std::int64_t id, const JournalFile::StoredMesh& stored, std::
   return true;
 }
 
-Journal::~Journal() { file_->StopThreads(); }
+Journal::~Journal() { shared_->StopThreads(); }
 
 std::shared_ptr<SessionJournal> Journal::NewMesh() {
-  return std::make_shared<RecordedMesh>(file_, options_.owner_bytes);
+  return std::make_shared<RecordedMesh>(shared_, options_.owner_bytes);
 }
 
 }  // namespace stellate::server

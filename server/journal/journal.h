@@ -15,7 +15,7 @@
 namespace stellate::server {
 
 struct JournalOptions {
-  std::string directory;          // made if it is not there
+  std::string directory;          // made if it is not there; empty: the records are elsewhere
   std::uint64_t max_bytes = 0;    // of the journal's file; 0: what the disk holds
   std::uint64_t owner_bytes = 0;  // of the records of an owner's meshes, where owners have names;
                                   // 0: no limit
@@ -24,10 +24,10 @@ struct JournalOptions {
 // Half of the space that a journal may use: its limit, or its size and the free space of the disk.
 std::uint64_t DefaultOwnerBytes(const std::string& directory, std::uint64_t max_bytes);
 
-// The record of all meshes of a server, in one SQLite file of its data directory. It has each
-// mesh's specification, the answers of each round, and its end; once the mesh has ended, the mesh
-// itself replaces the answers. Meshes write from their own threads, one transaction a round, synced
-// to the disk before the call returns.
+// The record of all meshes of a server, in one SQLite file of its data directory, or elsewhere. It
+// has each mesh's specification, the answers of each round, and its end; once the mesh has ended,
+// the mesh itself replaces the answers. Meshes write from their own threads, one transaction a
+// round, synced to the disk before the call returns.
 //
 //   auto journal = Journal::Open(options);
 //   for (SessionOptions& mesh : (*journal)->TakeMeshes()) store.Restore(std::move(mesh));
@@ -38,6 +38,10 @@ class Journal {
   // byte: the file is not a journal, has another version, is damaged (every record is read, and
   // must exist), or is open in another server.
   static core::Expected<std::unique_ptr<Journal>> Open(const JournalOptions& options);
+  // The same, of records that are elsewhere and open. kFailedPrecondition: they contradict each
+  // other.
+  static core::Expected<std::unique_ptr<Journal>> Over(std::unique_ptr<Records> records,
+                                                       const JournalOptions& options);
   // Running meshes keep their part of it open.
   ~Journal();
 
@@ -51,14 +55,22 @@ class Journal {
   // nothing if they can. Any thread; does not wait.
   std::optional<Refused> RefuseNewMesh(const std::string& owner, std::uint64_t bytes) const;
 
+  // Where the records are away, writes of meshes fail from now on, in place of waiting. Any thread.
+  void StopWaiting() { shared_->StopWaiting(); }
+  // Another server has taken the records, and its meshes with them. Any thread.
+  bool IsLost() const { return shared_->AreLost(); }
+
   // Bytes of the records of an owner's meshes; the file is larger by about a twentieth.
-  std::uint64_t OwnerBytes(const std::string& owner) const { return file_->OwnerBytes(owner); }
+  std::uint64_t OwnerBytes(const std::string& owner) const { return shared_->OwnerBytes(owner); }
 
  private:
-  Journal(std::shared_ptr<SharedJournal> file, JournalOptions options);
-  bool Take(std::int64_t id, const JournalFile::StoredMesh& stored, std::uint64_t bytes);
+  Journal(std::shared_ptr<SharedJournal> shared, JournalOptions options);
+  static core::Expected<std::unique_ptr<Journal>> Begin(std::unique_ptr<DataDirectory> directory,
+                                                        std::unique_ptr<Records> records,
+                                                        const JournalOptions& options);
+  bool Take(std::int64_t id, const StoredMesh& stored);
 
-  const std::shared_ptr<SharedJournal> file_;
+  const std::shared_ptr<SharedJournal> shared_;
   const JournalOptions options_;
   std::vector<SessionOptions> meshes_;
 };

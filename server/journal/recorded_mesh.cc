@@ -10,7 +10,7 @@ namespace {
 
 using core::Message;
 using Eigen::Index;
-using Found = JournalFile::Found;
+using Found = Records::Found;
 
 constexpr std::size_t kHistoryBytes = std::size_t{1} << 20;  // of a record
 
@@ -27,17 +27,16 @@ MeshFailure Unreadable(const std::string& what) {
 }  // namespace
 
 RecordedMesh::RecordedMesh(std::shared_ptr<SharedJournal> journal, std::uint64_t owner_limit,
-                           std::int64_t id, const JournalFile::StoredMesh& stored,
-                           const MeshRequest& request, std::uint64_t bytes)
+                           std::int64_t id, const StoredMesh& stored, const MeshRequest& request)
     : journal_(std::move(journal)),
       owner_limit_(owner_limit),
       id_(id),
-      counted_(bytes),
+      counted_(stored.bytes),
       has_history_(stored.has_history),
       rounds_(stored.rounds),
       has_answers_(stored.has_answers) {
   SetShape(request);
-  journal_->CountFor(owner_, static_cast<std::int64_t>(bytes));
+  journal_->CountFor(owner_, static_cast<std::int64_t>(stored.bytes));
 }
 
 void RecordedMesh::SetShape(const MeshRequest& request) {
@@ -52,14 +51,14 @@ void RecordedMesh::SetShape(const MeshRequest& request) {
 // Writes of about `bytes`, unless the mesh is not wanted any more.
 std::optional<MeshFailure> RecordedMesh::Do(const char* what, FairMutex::Place place,
                                             std::uint64_t bytes,
-                                            const std::function<bool(JournalFile*)>& action) {
+                                            const std::function<bool(Records*)>& action) {
   if (forgotten_) return std::nullopt;
   if (auto refused = RefuseShare(bytes)) return refused;
-  return journal_->Do(what, place, [&](JournalFile* file) {
-    // Under the file's lock: a removal comes before, and is seen here, or after, and sees the id.
+  return journal_->Do(what, place, [&](Records* records) {
+    // Under the records' lock: a removal comes before, and is seen here, or after, and sees the id.
     if (forgotten_) return true;
-    const bool done = action(file);
-    Recount(*file);
+    const bool done = action(records);
+    Recount(*records);
     return done;
   });
 }
@@ -75,8 +74,8 @@ std::optional<MeshFailure> RecordedMesh::RefuseShare(std::uint64_t bytes) const 
                              "needed, then mesh again")};
 }
 
-void RecordedMesh::Recount(const JournalFile& file) {
-  const std::uint64_t bytes = file.BytesOf(id_);
+void RecordedMesh::Recount(const Records& records) {
+  const std::uint64_t bytes = records.BytesOf(id_);
   journal_->CountFor(owner_, static_cast<std::int64_t>(bytes - counted_));
   counted_ = bytes;
 }
@@ -85,11 +84,11 @@ std::optional<MeshFailure> RecordedMesh::WriteStart(
     const MeshRequest& request, std::chrono::system_clock::time_point create_time) {
   SetShape(request);
   const std::string record = EncodeStart(request, create_time);
-  return Do("the mesh", FairMutex::Place::kLast, record.size(), [&](JournalFile* file) {
+  return Do("the mesh", FairMutex::Place::kLast, record.size(), [&](Records* records) {
     std::int64_t id = 0;
-    const bool written = file->Transact([&] {
-      id = file->NewMesh();
-      return file->Put({id, RecordKind::kStart}, record);
+    const bool written = records->Transact([&] {
+      id = records->NewMesh();
+      return records->Put({id, RecordKind::kStart}, record);
     });
     if (written) id_ = id;
     return written;
@@ -117,11 +116,11 @@ SessionJournal::Known RecordedMesh::BeginRound(const core::QueryBatch& batch) {
 
 // False: it cannot be read. A part that is not there is no fault here, nor are answers to other
 // questions, of which nothing is known.
-bool RecordedMesh::ReadAnswers(JournalFile* file, const core::QueryBatch& batch, std::int64_t part,
+bool RecordedMesh::ReadAnswers(Records* records, const core::QueryBatch& batch, std::int64_t part,
                                RecordedAnswers* answers, Found* found) const {
   const auto round = static_cast<std::int64_t>(batch.round);
   std::string record;
-  *found = file->Read({id_, RecordKind::kAnswers, round, part}, &record);
+  *found = records->Read({id_, RecordKind::kAnswers, round, part}, &record);
   if (*found != Found::kYes) return *found == Found::kNo;
   auto decoded = DecodeAnswers(record);
   if (!decoded) return false;
@@ -142,9 +141,9 @@ bool RecordedMesh::Fits(const core::QueryBatch& batch, const PartOfRound& part) 
 SessionJournal::Known RecordedMesh::ReadRound(const core::QueryBatch& batch) {
   const auto number = static_cast<std::int64_t>(batch.round);
   Known known{{}, {}, Unreadable(Message("round ", batch.round))};
-  journal_->Do("nothing", FairMutex::Place::kLast, [&](JournalFile* file) {
+  journal_->Do("nothing", FairMutex::Place::kLast, [&](Records* records) {
     std::string record;
-    if (file->Read({id_, RecordKind::kRound, number}, &record) != Found::kYes) return true;
+    if (records->Read({id_, RecordKind::kRound, number}, &record) != Found::kYes) return true;
     const auto round = DecodeRound(record);
     if (!round) return true;
     if (round->questions != questions_) {
@@ -158,7 +157,7 @@ SessionJournal::Known RecordedMesh::ReadRound(const core::QueryBatch& batch) {
     for (std::uint64_t part = 0; part < round->parts; ++part) {
       RecordedAnswers some;
       Found found;
-      if (!ReadAnswers(file, batch, static_cast<std::int64_t>(part), &some, &found)) return true;
+      if (!ReadAnswers(records, batch, static_cast<std::int64_t>(part), &some, &found)) return true;
       if (found != Found::kYes || some.questions != questions_) return true;
       for (const PartOfRound& one : some.parts) server::PutAnswers(one, &answers);
     }
@@ -175,11 +174,11 @@ SessionJournal::Known RecordedMesh::ReadPartOfRound(const core::QueryBatch& batc
   Known known;
   bool others = false;  // another version of the mesher asked them
   auto failure =
-      journal_->Do("the answers of a round", FairMutex::Place::kLast, [&](JournalFile* file) {
+      journal_->Do("the answers of a round", FairMutex::Place::kLast, [&](Records* records) {
         Found found = Found::kYes;
         for (std::int64_t part = 0; found == Found::kYes; ++part) {
           RecordedAnswers some;
-          if (!ReadAnswers(file, batch, part, &some, &found)) {
+          if (!ReadAnswers(records, batch, part, &some, &found)) {
             known.failure = Unreadable(Message("some of round ", batch.round));
             return true;
           }
@@ -194,9 +193,9 @@ SessionJournal::Known RecordedMesh::ReadPartOfRound(const core::QueryBatch& batc
         if (!others) return true;
         written_.clear();
         known = {};
-        return file->Transact([&] {
+        return records->Transact([&] {
           while (next_part_ > 0) {
-            if (!file->Remove({id_, RecordKind::kAnswers, number, --next_part_})) return false;
+            if (!records->Remove({id_, RecordKind::kAnswers, number, --next_part_})) return false;
           }
           return true;
         });
@@ -224,7 +223,7 @@ bool RecordedMesh::HasAnswers() const {
   return !pending_.empty() && !forgotten_;
 }
 
-bool RecordedMesh::WriteAnswers(JournalFile* file) {
+bool RecordedMesh::WriteAnswers(Records* records) {
   std::shared_ptr<const Round> round;
   draft_.next_part = next_part_;
   {
@@ -234,7 +233,7 @@ bool RecordedMesh::WriteAnswers(JournalFile* file) {
   }
   // An owner who has used up his share hears of it at the end of the round.
   if (draft_.written.empty() || RefuseShare(1)) return true;
-  return PutAnswers(file, round->answers, draft_.written, &draft_.next_part);
+  return PutAnswers(records, round->answers, draft_.written, &draft_.next_part);
 }
 
 void RecordedMesh::AnswersWritten(bool written) {
@@ -245,11 +244,11 @@ void RecordedMesh::AnswersWritten(bool written) {
   draft_.written.clear();
 }
 
-bool RecordedMesh::PutAnswers(JournalFile* file, const core::Answers& answers,
+bool RecordedMesh::PutAnswers(Records* records, const core::Answers& answers,
                               const std::vector<AnswerRange>& ranges,
                               std::int64_t* next_part) const {
   return EncodeAnswers(answers, ranges, questions_, [&](const std::string& record) {
-    return file->Put({id_, RecordKind::kAnswers, round_, (*next_part)++}, record);
+    return records->Put({id_, RecordKind::kAnswers, round_, (*next_part)++}, record);
   });
 }
 
@@ -262,12 +261,12 @@ std::optional<MeshFailure> RecordedMesh::WriteRound(const core::QueryBatch& batc
     answers_.reset();
   }
   RecordedRound round{questions_, DigestOf(answers), 0, standing};
-  auto failure = Do("the answers of a round", FairMutex::Place::kLast, 1, [&](JournalFile* file) {
-    return file->Transact([&] {
+  auto failure = Do("the answers of a round", FairMutex::Place::kLast, 1, [&](Records* records) {
+    return records->Transact([&] {
       std::int64_t parts = next_part_;
-      if (!PutAnswers(file, answers, Missing(Merged(written_), sizes_), &parts)) return false;
+      if (!PutAnswers(records, answers, Missing(Merged(written_), sizes_), &parts)) return false;
       round.parts = static_cast<std::uint64_t>(parts);
-      return file->Put({id_, RecordKind::kRound, round_}, EncodeRound(round));
+      return records->Put({id_, RecordKind::kRound, round_}, EncodeRound(round));
     });
   });
   if (!failure) rounds_ = batch.round;
@@ -276,9 +275,9 @@ std::optional<MeshFailure> RecordedMesh::WriteRound(const core::QueryBatch& batc
 
 // It is short, and others wait for it.
 std::optional<MeshFailure> RecordedMesh::WriteEnd(const SessionEnd& end) {
-  return Do("the end of the mesh", FairMutex::Place::kFirst, 0, [&](JournalFile* file) {
-    return id_ == 0 || file->Transact([&] {
-      return file->Put({id_, RecordKind::kEnd}, EncodeEnd(end));
+  return Do("the end of the mesh", FairMutex::Place::kFirst, 0, [&](Records* records) {
+    return id_ == 0 || records->Transact([&] {
+      return records->Put({id_, RecordKind::kEnd}, EncodeEnd(end));
     });
   });
 }
@@ -289,8 +288,8 @@ std::optional<MeshFailure> RecordedMesh::WriteResult(const SessionResult& result
   std::optional<MeshFailure> failure;
   // Of a server that was killed as it wrote.
   for (bool done = !has_history_; !done && !failure;) {
-    failure = Do("the finished mesh", FairMutex::Place::kLast, 0, [&](JournalFile* file) {
-      return file->RemoveSome(id_, JournalFile::Kinds::kHistory, &done);
+    failure = Do("the finished mesh", FairMutex::Place::kLast, 0, [&](Records* records) {
+      return records->RemoveSome(id_, Records::Kinds::kHistory, &done);
     });
     done = done || forgotten_;
   }
@@ -299,9 +298,9 @@ std::optional<MeshFailure> RecordedMesh::WriteResult(const SessionResult& result
   std::int64_t parts = 0;
   const auto put = [&] {
     failure =
-        Do("the finished mesh", FairMutex::Place::kLast, record.size(), [&](JournalFile* file) {
-          return file->Transact([&] {
-            return file->Put({id_, RecordKind::kHistoryPart, 0, parts}, record);
+        Do("the finished mesh", FairMutex::Place::kLast, record.size(), [&](Records* records) {
+          return records->Transact([&] {
+            return records->Put({id_, RecordKind::kHistoryPart, 0, parts}, record);
           });
         });
     ++parts;
@@ -319,10 +318,10 @@ std::optional<MeshFailure> RecordedMesh::WriteResult(const SessionResult& result
     return true;
   };
   if (!failure && history.Write(add) && (record.empty() || put())) {
-    failure = Do("the finished mesh", FairMutex::Place::kFirst, 0, [&](JournalFile* file) {
-      return file->Transact([&] {
-        return file->Put({id_, RecordKind::kResult},
-                         EncodeResult(result, static_cast<std::uint64_t>(parts)));
+    failure = Do("the finished mesh", FairMutex::Place::kFirst, 0, [&](Records* records) {
+      return records->Transact([&] {
+        return records->Put({id_, RecordKind::kResult},
+                            EncodeResult(result, static_cast<std::uint64_t>(parts)));
       });
     });
   }
@@ -338,8 +337,8 @@ core::Expected<std::unique_ptr<MeshHistory>> RecordedMesh::ReadHistory() {
     for (char* at = static_cast<char*>(data); bytes > 0;) {
       if (used == record.size()) {
         Found found = Found::kNo;
-        journal_->Do("nothing", FairMutex::Place::kLast, [&](JournalFile* file) {
-          found = file->Read({id_, RecordKind::kHistoryPart, 0, part++}, &record);
+        journal_->Do("nothing", FairMutex::Place::kLast, [&](Records* records) {
+          found = records->Read({id_, RecordKind::kHistoryPart, 0, part++}, &record);
           return true;
         });
         used = 0;
@@ -361,12 +360,12 @@ void RecordedMesh::Forget() {
   if (!forgotten_.exchange(true)) journal_->RemoveLater(shared_from_this());
 }
 
-bool RecordedMesh::RemoveSome(JournalFile* file, bool* done) {
+bool RecordedMesh::RemoveSome(Records* records, bool* done) {
   *done = id_ == 0;
   if (*done) return true;
-  const auto kinds = forgotten_ ? JournalFile::Kinds::kAll : JournalFile::Kinds::kRounds;
-  const bool removed = file->RemoveSome(id_, kinds, done);
-  Recount(*file);
+  const auto kinds = forgotten_ ? Records::Kinds::kAll : Records::Kinds::kRounds;
+  const bool removed = records->RemoveSome(id_, kinds, done);
+  Recount(*records);
   return removed;
 }
 

@@ -10,7 +10,7 @@
 #include "server/journal/shared_journal.h"
 #include "server/records/journal_format.h"
 #include "server/session/session_journal.h"
-#include "server/storage/journal_file.h"
+#include "server/storage/records.h"
 
 namespace stellate::server {
 
@@ -25,8 +25,7 @@ class RecordedMesh final : public SessionJournal,
       : journal_(std::move(journal)), owner_limit_(owner_limit) {}
   // A recorded mesh.
   RecordedMesh(std::shared_ptr<SharedJournal> journal, std::uint64_t owner_limit, std::int64_t id,
-               const JournalFile::StoredMesh& stored, const MeshRequest& request,
-               std::uint64_t bytes);
+               const StoredMesh& stored, const MeshRequest& request);
 
   std::optional<MeshFailure> WriteStart(const MeshRequest& request,
                                         std::chrono::system_clock::time_point create_time) override;
@@ -42,24 +41,24 @@ class RecordedMesh final : public SessionJournal,
   void Forget() override;
 
   bool HasAnswers() const override;
-  bool WriteAnswers(JournalFile* file) override;
+  bool WriteAnswers(Records* records) override;
   void AnswersWritten(bool written) override;
-  bool RemoveSome(JournalFile* file, bool* done) override;
+  bool RemoveSome(Records* records, bool* done) override;
   // The result is recorded: removes the rounds that led to it.
   void RemoveRounds();
 
  private:
   void SetShape(const MeshRequest& request);
   std::optional<MeshFailure> Do(const char* what, FairMutex::Place place, std::uint64_t bytes,
-                                const std::function<bool(JournalFile*)>& action);
+                                const std::function<bool(Records*)>& action);
   std::optional<MeshFailure> RefuseShare(std::uint64_t bytes) const;
-  void Recount(const JournalFile& file);
-  bool PutAnswers(JournalFile* file, const core::Answers& answers,
+  void Recount(const Records& records);
+  bool PutAnswers(Records* records, const core::Answers& answers,
                   const std::vector<AnswerRange>& ranges, std::int64_t* next_part) const;
   Known ReadRound(const core::QueryBatch& batch);
   Known ReadPartOfRound(const core::QueryBatch& batch);
-  bool ReadAnswers(JournalFile* file, const core::QueryBatch& batch, std::int64_t part,
-                   RecordedAnswers* answers, JournalFile::Found* found) const;
+  bool ReadAnswers(Records* records, const core::QueryBatch& batch, std::int64_t part,
+                   RecordedAnswers* answers, Records::Found* found) const;
   bool Fits(const core::QueryBatch& batch, const PartOfRound& part) const;
 
   const std::shared_ptr<SharedJournal> journal_;
@@ -70,7 +69,7 @@ class RecordedMesh final : public SessionJournal,
   } shape_;
   std::atomic<bool> forgotten_{false};
 
-  // Only for the thread that has locked the file.
+  // Only for the thread that has locked the records.
   std::int64_t id_ = 0;               // 0: not recorded
   std::uint64_t counted_ = 0;         // of its bytes, for its owner
   bool has_history_ = false;          // some of it

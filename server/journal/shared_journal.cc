@@ -23,30 +23,29 @@ constexpr int kGatherShare = 10;
 }  // namespace
 
 std::optional<MeshFailure> SharedJournal::Do(const char* what, FairMutex::Place place,
-                                             const std::function<bool(JournalFile*)>& action) {
+                                             const std::function<bool(Records*)>& action) {
   std::optional<MeshFailure> failure;
   bool is_long = false;
   {
     const FairLock turn(mutex_, place);
-    if (!action(file_.get())) failure = WhyNot(what);
-    is_long = file_->IsLogLong();
+    if (!action(records_.get())) failure = WhyNot(what);
+    is_long = records_->IsLogLong();
   }
   if (is_long) NoteLongLog();
   return failure;
 }
 
 MeshFailure SharedJournal::WhyNot(const char* what) {
-  Sqlite& database = file_->database();
-  const bool full = database.IsFull();
+  const auto [full, message] = records_->trouble();
   MeshFailure failure{full ? FailureReason::kJournalFull : FailureReason::kJournalFailed,
-                      Message("the server cannot record ", what, ": ", database.error(),
+                      Message("the server cannot record ", what, ": ", message,
                               full ? "; free space by deleting meshes, then mesh again" : "")};
-  file_->Abandon();
+  records_->Abandon();
   return failure;
 }
 
 void SharedJournal::StartThreads() {
-  space_is_due_ = file_->HasSpaceToGiveBack();  // that an earlier server did not come to
+  space_is_due_ = records_->HasSpaceToGiveBack();  // that an earlier server did not come to
   writer_ = std::jthread([this](const std::stop_token& stop) { Write(stop); });
   keeper_ = std::jthread([this](const std::stop_token& stop) { Keep(stop); });
 }
@@ -97,14 +96,14 @@ void SharedJournal::Write(const std::stop_token& stop) {
     lock.unlock();
     const TimePoint begin = Clock::now();
     // If this fails the end of the round, which writes what is missing, says why.
-    Do("answers", FairMutex::Place::kLast, [&meshes](JournalFile* file) {
+    Do("answers", FairMutex::Place::kLast, [&meshes](Records* records) {
       std::vector<Mesh*> ready;
       for (const auto& mesh : meshes) {
         if (mesh->HasAnswers()) ready.push_back(mesh.get());
       }
-      const bool written = ready.empty() || file->Transact([&] {
+      const bool written = ready.empty() || records->Transact([&] {
         return std::all_of(ready.begin(), ready.end(),
-                           [&](Mesh* mesh) { return mesh->WriteAnswers(file); });
+                           [&](Mesh* mesh) { return mesh->WriteAnswers(records); });
       });
       for (Mesh* const mesh : ready) mesh->AnswersWritten(written);
       return written;
@@ -122,7 +121,7 @@ void SharedJournal::Keep(const std::stop_token& stop) {
       if (stop.stop_requested()) return;
       lock.unlock();
       Do("the mark", FairMutex::Place::kFirst,
-         [](JournalFile* file) { return file->SyncMark(), true; });
+         [](Records* records) { return records->SyncMark(), true; });
       lock.lock();
       continue;
     }
@@ -152,19 +151,19 @@ void SharedJournal::Keep(const std::stop_token& stop) {
 void SharedJournal::Checkpoint() {
   const FairLock turn(mutex_, FairMutex::Place::kFirst);
   // If this fails the log grows on, until a write fails and says why.
-  if (!file_->Checkpoint()) file_->Abandon();
+  if (!records_->Checkpoint()) records_->Abandon();
 }
 
 bool SharedJournal::RemoveSome(Mesh* mesh, bool* done) {
   const auto failure = Do("the removal of a mesh", FairMutex::Place::kLast,
-                          [&](JournalFile* file) { return mesh->RemoveSome(file, done); });
+                          [&](Records* records) { return mesh->RemoveSome(records, done); });
   if (failure) Log(LogLevel::kWarning, {}, failure->message);
   return !failure;
 }
 
 bool SharedJournal::GiveBackSome(bool* done) {
   const auto failure = Do("what was removed", FairMutex::Place::kLast,
-                          [&](JournalFile* file) { return file->GiveBackSome(done); });
+                          [&](Records* records) { return records->GiveBackSome(done); });
   if (failure) Log(LogLevel::kWarning, {}, failure->message);
   return !failure;
 }

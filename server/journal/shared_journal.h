@@ -16,36 +16,41 @@
 #include "server/journal/fair_mutex.h"
 #include "server/oracles/oracle_pool.h"
 #include "server/storage/data_directory.h"
-#include "server/storage/journal_file.h"
+#include "server/storage/records.h"
 
 namespace stellate::server {
 
-// A journal's file, shared by many threads, and two threads of its own: one writes the answers of
+// A server's records, shared by many threads, and two threads of its own: one writes the answers of
 // incomplete rounds; the other removes records and compacts the file, in pieces, so that others can
 // write in between. Neither workers nor callers of DeleteMesh wait for the disk.
 class SharedJournal {
  public:
-  // Called by the two threads, which have locked the file.
+  // Called by the two threads, which have locked the records.
   class Mesh {
    public:
     virtual ~Mesh() = default;
     virtual bool HasAnswers() const = 0;
     // In a transaction. False: the disk failed.
-    virtual bool WriteAnswers(JournalFile* file) = 0;
+    virtual bool WriteAnswers(Records* records) = 0;
     // Whether what WriteAnswers wrote is on the disk.
     virtual void AnswersWritten(bool written) = 0;
     // Removes one piece; sets `done` once nothing is left.
-    virtual bool RemoveSome(JournalFile* file, bool* done) = 0;
+    virtual bool RemoveSome(Records* records, bool* done) = 0;
   };
 
-  SharedJournal(std::unique_ptr<DataDirectory> directory, std::unique_ptr<JournalFile> file)
-      : directory_(std::move(directory)), file_(std::move(file)) {}
+  // `directory`: of records in a file, kept locked until that is closed; null: they are elsewhere.
+  SharedJournal(std::unique_ptr<DataDirectory> directory, std::unique_ptr<Records> records)
+      : directory_(std::move(directory)), records_(std::move(records)) {}
 
-  // Runs `action` with the file locked. Returns why the server cannot record `what` if it returned
-  // false.
+  // Runs `action` with the records locked. Returns why the server cannot record `what` if it
+  // returned false.
   std::optional<MeshFailure> Do(const char* what, FairMutex::Place place,
-                                const std::function<bool(JournalFile*)>& action);
+                                const std::function<bool(Records*)>& action);
 
+  // No thread waits any longer for records that are away: its call fails. Any thread.
+  void StopWaiting() { records_->StopWaiting(); }
+  // Another server has taken the records. Any thread.
+  bool AreLost() const { return records_->AreLost(); }
   void StartThreads();
   // Tries once more whatever is due.
   void StopThreads();
@@ -66,9 +71,9 @@ class SharedJournal {
   bool RemoveSome(Mesh* mesh, bool* done);
   bool GiveBackSome(bool* done);
 
-  const std::unique_ptr<DataDirectory> directory_;  // kept locked until the file is closed
+  const std::unique_ptr<DataDirectory> directory_;
   FairMutex mutex_;
-  const std::unique_ptr<JournalFile> file_;
+  const std::unique_ptr<Records> records_;
 
   mutable std::mutex due_mutex_;  // of all that follows; never locked during a wait for the disk
   std::condition_variable_any answers_due_, work_due_;

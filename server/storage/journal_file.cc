@@ -110,12 +110,7 @@ bool JournalFile::RemoveSome(std::int64_t mesh, Kinds kinds, bool* done) {
 
 // The last rounds first: what is left has no gap.
 bool JournalFile::RemovePiece(std::int64_t mesh, Kinds kinds, bool* done) {
-  const auto first = kinds == Kinds::kAll      ? RecordKind::kState
-                     : kinds == Kinds::kRounds ? RecordKind::kRound
-                                               : RecordKind::kHistoryPart;
-  const auto last = kinds == Kinds::kAll      ? RecordKind::kRemoved
-                    : kinds == Kinds::kRounds ? RecordKind::kAnswers
-                                              : RecordKind::kHistoryPart;
+  const auto [first, last] = RangeOf(kinds);
   std::vector<std::int64_t> ids;
   std::int64_t bytes = 0;
   std::uint64_t sum = 0;

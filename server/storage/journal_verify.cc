@@ -146,40 +146,9 @@ Status JournalFile::VerifyRecords(const std::string& path, JournalState* found) 
 // False: there is no such place.
 bool JournalFile::Note(const Place& place, std::string_view record) {
   StoredMesh& mesh = meshes_[place.mesh];
+  mesh.bytes += record.size();
   bytes_[place.mesh] += record.size();
-  switch (place.kind) {
-    case RecordKind::kStart:
-      mesh.start = record;
-      return true;
-    case RecordKind::kEnd:
-      mesh.end = record;
-      return true;
-    case RecordKind::kResult:
-      mesh.result = record;
-      return true;
-    case RecordKind::kRound: {
-      const auto round = DecodeRound(record);
-      if (!round || place.number < 1) return false;
-      const auto number = static_cast<std::uint64_t>(place.number);
-      if (number > mesh.rounds) {
-        mesh.rounds = number;
-        mesh.last = round->standing;
-      }
-      return true;
-    }
-    case RecordKind::kAnswers:
-      mesh.has_answers = true;
-      return true;
-    case RecordKind::kHistoryPart:
-      mesh.has_history = true;
-      return true;
-    case RecordKind::kRemoved:
-      mesh.removed = true;
-      return true;
-    case RecordKind::kState:
-      break;
-  }
-  return false;
+  return mesh.Note(place, record);
 }
 
 }  // namespace stellate::server

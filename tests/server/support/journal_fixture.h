@@ -7,6 +7,7 @@
 #include <atomic>
 #include <filesystem>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <string>
 #include <thread>
@@ -28,6 +29,12 @@ inline void Overwrite(const std::string& path, const std::string& content) {
   std::ofstream(path, std::ios::binary | std::ios::trunc) << content;
 }
 
+// How a test opens its journal. A program that has its journals elsewhere sets it before the first
+// test, and the same cases hold there; `directory` tells journals apart.
+using JournalOpener =
+    std::function<core::Expected<std::unique_ptr<Journal>>(const JournalOptions&)>;
+inline JournalOpener open_journal = Journal::Open;
+
 // A data directory of its own for each test.
 class JournalTest : public ::testing::Test {
  protected:
@@ -42,8 +49,8 @@ class JournalTest : public ::testing::Test {
   std::string file() const { return directory_ + "/journal.sqlite"; }
   std::string log() const { return file() + "-wal"; }
 
-  std::unique_ptr<Journal> Open(std::uint64_t max_bytes = 0) {
-    auto journal = Journal::Open({directory_, max_bytes});
+  std::unique_ptr<Journal> Open(std::uint64_t max_bytes = 0, std::uint64_t owner_bytes = 0) {
+    auto journal = open_journal({directory_, max_bytes, owner_bytes});
     EXPECT_TRUE(journal) << journal.error().message;
     return journal ? std::move(*journal) : nullptr;
   }
