@@ -29,6 +29,7 @@ namespace {
 using namespace stellate::server;  // NOLINT: this file is the program
 
 constexpr int kExitUsage = 2;
+constexpr int kExitLost = 1;  // another server has the meshes
 constexpr auto kHealthLimit = std::chrono::seconds(5);
 
 // SIGHUP has something to say only where there are files to read again; elsewhere it ends the
@@ -85,11 +86,16 @@ bool WriteReadyFile(const std::string& path, const std::string& address) {
   return file.good() && std::rename(draft.c_str(), path.c_str()) == 0;
 }
 
-stellate::core::Expected<std::unique_ptr<Server>> StartServer(const Config& config) {
+stellate::core::Expected<std::unique_ptr<Server>> StartServer(const Flags& flags, pid_t parent,
+                                                              const sigset_t& signals) {
   auto threads = CheckThreads(LeastThreads());
   if (!threads.ok()) return tl::unexpected(std::move(threads));
   try {
-    return Server::Start(config);
+    return Server::Start(flags.config, stellate::core::Mesher::Create, [&] {
+      if (flags.exit_with_parent && getppid() != parent) return true;
+      const int signal = WaitForSignal(signals, 0);
+      return signal != 0 && signal != SIGHUP;
+    });
   } catch (const std::system_error& error) {  // each recorded mesh that goes on needs a thread
     return stellate::core::Refuse(
         stellate::core::StatusCode::kFailedPrecondition,
@@ -99,20 +105,22 @@ stellate::core::Expected<std::unique_ptr<Server>> StartServer(const Config& conf
   }
 }
 
-// Returns when it is time to stop. True: at once, as nobody is left to wait for.
-bool ServeUntilTold(Server* server, const sigset_t& signals, bool with_parent, pid_t parent) {
+// Returns when it is time to stop. kAtOnce: nobody is left to wait for.
+enum class Why { kTold, kAtOnce, kLost };
+Why ServeUntilTold(Server* server, const sigset_t& signals, bool with_parent, pid_t parent) {
   while (true) {
     const int signal = WaitForSignal(signals, 250);
     if (signal == SIGHUP) {
       server->ReloadFiles();
     } else if (signal != 0) {
       Log(LogLevel::kInfo, {}, "stopping", stellate::server::LogFields().Add("signal", signal));
-      return false;
+      return Why::kTold;
     }
+    if (server->HasLostItsMeshes()) return Why::kLost;
     // Polled, as PR_SET_PDEATHSIG would fire when the parent's *thread* ends.
     if (with_parent && getppid() != parent) {
       Log(LogLevel::kInfo, {}, "the parent process is gone: stopping");
-      return true;
+      return Why::kAtOnce;
     }
   }
 }
@@ -135,7 +143,8 @@ int main(int argc, char** argv) {
   StartLogging(config.log_level, config.log_format);
   stellate::server::TakeLibraryLogs();
 
-  auto server = StartServer(config);
+  auto server = StartServer(flags, parent, signals);
+  if (!server && server.error().code == stellate::core::StatusCode::kCancelled) return 0;
   if (!server) return Fail(server.error().message, kExitUsage);
   const std::string& address = (*server)->address();
   std::printf("stellated listening on %s\n", address.c_str());
@@ -146,8 +155,8 @@ int main(int argc, char** argv) {
     return Fail("cannot write --ready-file " + config.ready_file, 1);
   }
 
-  const bool at_once = ServeUntilTold(server->get(), signals, flags.exit_with_parent, parent);
-  const std::chrono::duration<double> drain(at_once ? 0 : config.drain_seconds);
+  const Why why = ServeUntilTold(server->get(), signals, flags.exit_with_parent, parent);
+  const std::chrono::duration<double> drain(why == Why::kTold ? config.drain_seconds : 0);
   const bool clean = (*server)->Stop(std::chrono::duration_cast<Clock::duration>(drain), [&] {
     const int signal = WaitForSignal(signals, 0);
     return signal != 0 && signal != SIGHUP;
@@ -155,6 +164,7 @@ int main(int argc, char** argv) {
   if (!config.ready_file.empty()) unlink(config.ready_file.c_str());
   Log(LogLevel::kInfo, {}, "stopped");
   // A mesher in the middle of a round cannot be asked to leave: the process takes it along.
-  if (!clean) std::_Exit(0);
-  return 0;
+  const int status = why == Why::kLost ? kExitLost : 0;  // who started it may start it again
+  if (!clean) std::_Exit(status);
+  return status;
 }

@@ -13,6 +13,7 @@
 
 #include "server/drain.h"
 #include "server/net/guarded_server.h"
+#include "server/postgres/database.h"
 #include "server/rpc/service.h"
 #include "stellate/v1/stellate.grpc.pb.h"
 
@@ -45,6 +46,25 @@ StoreLimits ToStoreLimits(const Config& config) {
           config.owner_meshes};
 }
 
+core::Expected<std::unique_ptr<Journal>> OpenDirectory(const Config& config) {
+  const std::uint64_t share = config.owner_journal_bytes > 0
+                                  ? config.owner_journal_bytes
+                                  : DefaultOwnerBytes(config.data_dir, config.max_journal_bytes);
+  return Journal::Open({config.data_dir, config.max_journal_bytes, share});
+}
+
+core::Expected<std::unique_ptr<Journal>> OpenRecords(const Config& config,
+                                                     const std::function<bool()>& give_up) {
+  const auto patience = std::chrono::duration_cast<Clock::duration>(
+      std::chrono::duration<double>(config.database_patience_seconds));
+  auto records =
+      OpenDatabase({config.database, config.listen, config.max_journal_bytes, patience}, give_up);
+  if (!records) return tl::unexpected(std::move(records.error()));
+  const std::uint64_t share =
+      config.owner_journal_bytes > 0 ? config.owner_journal_bytes : config.max_journal_bytes / 2;
+  return Journal::Over(std::move(*records), {"", config.max_journal_bytes, share});
+}
+
 }  // namespace
 
 // Members are destroyed from the last to the first: the server before what its calls use.
@@ -61,13 +81,10 @@ class Server::Impl {
   }
 
   // Takes up the meshes of an earlier server.
-  Status OpenJournal() {
-    const Config& config = state.config;
-    if (config.data_dir.empty()) return Status::Ok();
-    const std::uint64_t share = config.owner_journal_bytes > 0
-                                    ? config.owner_journal_bytes
-                                    : DefaultOwnerBytes(config.data_dir, config.max_journal_bytes);
-    auto journal = Journal::Open({config.data_dir, config.max_journal_bytes, share});
+  Status OpenJournal(const std::function<bool()>& give_up) {
+    if (!IsDurable(state.config)) return Status::Ok();
+    auto journal = state.config.database.empty() ? OpenDirectory(state.config)
+                                                 : OpenRecords(state.config, give_up);
     if (!journal) return std::move(journal.error());
     state.journal = std::move(*journal);
     state.store.RecordIn([this] { return state.journal->NewMesh(); });
@@ -124,7 +141,8 @@ Server::Server(std::unique_ptr<Impl> impl, std::string address)
 Server::~Server() { Stop(Clock::duration::zero()); }
 
 core::Expected<std::unique_ptr<Server>> Server::Start(const Config& config,
-                                                      Session::MesherFactory factory) {
+                                                      Session::MesherFactory factory,
+                                                      const std::function<bool()>& give_up) {
   Status status = Validate(config);
   if (!status.ok()) return tl::unexpected(std::move(status));
   static std::once_flag plugins;
@@ -138,7 +156,7 @@ core::Expected<std::unique_ptr<Server>> Server::Start(const Config& config,
   if (!authenticator) return tl::unexpected(std::move(authenticator.error()));
   auto impl = std::make_unique<Impl>(WithDefaults(config), std::move(factory));
   impl->state.authenticator = std::move(*authenticator);
-  status = impl->OpenJournal();
+  status = impl->OpenJournal(give_up);
   if (!status.ok()) return tl::unexpected(std::move(status));
   status = impl->ListenForPrometheus();
   if (!status.ok()) return tl::unexpected(std::move(status));
@@ -153,6 +171,11 @@ core::Expected<std::unique_ptr<Server>> Server::Start(const Config& config,
 }
 
 int Server::metrics_port() const { return impl_->state.metrics.port(); }
+
+bool Server::HasLostItsMeshes() const {
+  const ServerState& state = impl_->state;
+  return state.journal != nullptr && state.journal->IsLost();
+}
 
 void Server::ReloadFiles() {
   impl_->server->ReloadFiles();
@@ -184,7 +207,9 @@ bool Server::Stop(Clock::duration drain, const std::function<bool()>& hurry) {
   impl.ticker.join();
   LogLeftOut();
   state.metrics.StopListening();
-  return state.store.Stop(Clock::now() + kLastRound);
+  return state.store.Stop(Clock::now() + kLastRound, [&state] {
+    if (state.journal != nullptr) state.journal->StopWaiting();
+  });
 }
 
 }  // namespace stellate::server

@@ -14,16 +14,21 @@ namespace stellate::server {
 // A running server. Several may live in one process, each with its own address.
 class Server {
  public:
-  // Listens once this returns. kInvalidArgument: the configuration; kFailedPrecondition: the
-  // address is taken or cannot be bound.
+  // Listens once this returns. Where another server has the database, this waits for that, and asks
+  // `give_up` now and then. kInvalidArgument: the configuration; kFailedPrecondition: the address
+  // is taken or cannot be bound, or the record cannot be opened; kCancelled: it gave up.
   static core::Expected<std::unique_ptr<Server>> Start(
-      const Config& config, Session::MesherFactory factory = core::Mesher::Create);
+      const Config& config, Session::MesherFactory factory = core::Mesher::Create,
+      const std::function<bool()>& give_up = [] { return false; });
   ~Server();
 
   // What clients dial: "127.0.0.1:7717", "unix:/path".
   const std::string& address() const { return address_; }
   // Where Prometheus is answered; 0: nowhere.
   int metrics_port() const;
+
+  // Another server has taken the database, and the meshes with it: stop.
+  bool HasLostItsMeshes() const;
 
   // Reads the token file, and those of TLS, again, as happens by itself within seconds of a change.
   void ReloadFiles();

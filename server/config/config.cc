@@ -52,7 +52,15 @@ Status Validate(const Config& config) {
   if (!address) return address.error();
   Status safety = ValidateSafety(config, *address);
   if (!safety.ok()) return safety;
+  if (!config.data_dir.empty() && !config.database.empty()) {
+    return Invalid(
+        "--data-dir and --database both say where meshes are recorded: give one of them");
+  }
   return CheckRanges(config);
+}
+
+bool IsDurable(const Config& config) {
+  return !config.data_dir.empty() || !config.database.empty();
 }
 
 Config WithDefaults(Config config) {
@@ -64,7 +72,7 @@ Config WithDefaults(Config config) {
 
 double MaxWaitSeconds(const Config& config) {
   if (config.max_wait_seconds > 0) return config.max_wait_seconds;
-  return config.data_dir.empty() ? 3600 : 30 * 86400.0;
+  return IsDurable(config) ? 30 * 86400.0 : 3600;
 }
 
 std::size_t ChunkBytes(const Config& config) {

@@ -16,7 +16,8 @@ struct Config {
   std::string listen = "127.0.0.1:7717";
   bool insecure_listen = false;  // plain text beyond this machine
   std::string ready_file;        // written with the address once the server listens
-  std::string data_dir;          // of the journal; empty: meshes live in memory alone
+  std::string data_dir;          // of the journal; empty: meshes live in memory alone,
+  std::string database;          // or in PostgreSQL: a URL, or a file that holds one
 
   std::string tls_certificate, tls_key;  // PEM files; empty: plain text
   std::string tls_client_ca;             // PEM file; clients need a certificate of this authority
@@ -59,6 +60,8 @@ struct Config {
   double request_seconds = 60;  // for a request to be complete
   double unread_seconds = 600;  // for a watcher to read a message
 
+  double database_patience_seconds = 3600;  // for --database to answer
+
   double drain_seconds = 10;  // for running meshes to end, after SIGTERM
   double keepalive_seconds = 2;
   double keepalive_timeout_seconds = 5;
@@ -71,6 +74,9 @@ struct Config {
 
 // kInvalidArgument, with the flag, its value and what to do.
 core::Status Validate(const Config& config);
+
+// Whether meshes outlive the server.
+bool IsDurable(const Config& config);
 
 // Replaces zeros that stand for a part of this machine, or of another limit, by numbers.
 Config WithDefaults(Config config);

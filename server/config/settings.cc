@@ -80,6 +80,11 @@ const std::vector<Setting>& Settings() {
       {"", "--data-dir", &Config::data_dir,
        "Directory to record meshes in, so that they outlive the server; without it they live in "
        "memory alone"},
+      {"", "--database", &Config::database,
+       "Record meshes in PostgreSQL instead: a URL, postgresql://USER@HOST/NAME, or a file that "
+       "holds one, as it must where there is a password in it. One server has a database at a "
+       "time; "
+       "others stand by, and take over"},
 
       {kSafety, "--insecure-listen", &Config::insecure_listen,
        "Allow plain text on an address that other machines reach"},
@@ -98,7 +103,7 @@ const std::vector<Setting>& Settings() {
        "Estimated memory of all meshes; 0: three quarters of what the machine or container has", 0,
        kBytes},
       {kServerLimits, "--max-journal-bytes", &Config::max_journal_bytes,
-       "Size of the record in --data-dir; 0: what the disk holds", 0, kBytes},
+       "Size of the record in --data-dir or --database; 0: what there is room for", 0, kBytes},
       {kServerLimits, "--max-message-bytes", &Config::max_message_bytes,
        "Largest message, both ways", kMebibyte, 1024 * kMebibyte},
       {kServerLimits, "--max-unread-bytes", &Config::max_unread_bytes,
@@ -123,8 +128,8 @@ const std::vector<Setting>& Settings() {
       {kOwnerLimits, "--owner-memory-bytes", &Config::owner_memory_bytes,
        "Estimated memory of an owner's meshes; 0: half of the server's", 0, kBytes},
       {kOwnerLimits, "--owner-journal-bytes", &Config::owner_journal_bytes,
-       "Size of an owner's records in --data-dir; 0: half of --max-journal-bytes, or of what the "
-       "disk has for them at the start",
+       "Size of an owner's records; 0: half of --max-journal-bytes, or of what the disk of "
+       "--data-dir has for them at the start, or no limit with --database",
        0, kBytes},
 
       {kMeshLimits, "--max-vertices", &Config::max_vertices, "Vertices", 1,
@@ -155,8 +160,9 @@ const std::vector<Setting>& Settings() {
       {kTimes, "--busy-seconds", &Config::busy_seconds,
        "How long a worker may take for a chunk in all, unless its client says", kMoment, kYear},
       {kTimes, "--max-wait", &Config::max_wait_seconds,
-       "Most that a client may ask for of these three; 0: an hour, and 30 days with --data-dir", 0,
-       kYear},
+       "Most that a client may ask for of these three; 0: an hour, and 30 days with --data-dir or "
+       "--database",
+       0, kYear},
       {kTimes, "--keep-finished-seconds", &Config::keep_finished_seconds,
        "How long a finished mesh can be read", 0, kYear},
       {kTimes, "--hello-seconds", &Config::hello_seconds,
@@ -169,6 +175,8 @@ const std::vector<Setting>& Settings() {
        "How long a watcher may leave a message unread; then its stream ends as CANCELLED, and it "
        "may come back with the last revision that it has",
        kMoment, kYear},
+      {kTimes, "--database-patience", &Config::database_patience_seconds,
+       "How long a mesh waits for a --database that does not answer, before it fails", 0, kYear},
       {kTimes, "--drain-seconds", &Config::drain_seconds,
        "Time for meshes that are served to end after SIGTERM; a second signal ends it", 0, kYear},
       {kTimes, "--keepalive", &Config::keepalive_seconds, "Time between pings to a silent client",

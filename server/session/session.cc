@@ -381,8 +381,10 @@ Session::Ending Session::ChooseEnd(const core::Report* report) {
   end = {FinalState(report), std::max(std::chrono::system_clock::now(), create_time_),
          Seconds(Clock::now() - created_), failure_, progress_.round};
   ending.server_stops = life_.now() == Life::kSuspended;
-  ending.is_suspended =
-      ending.server_stops && ports().journal != nullptr && end.state == SessionState::kCancelled;
+  // Also where the journal was waited for, and the wait was broken off.
+  ending.is_suspended = ending.server_stops && ports().journal != nullptr &&
+                        (end.state == SessionState::kCancelled ||
+                         end.failure.reason == FailureReason::kJournalFailed);
   const bool ended_before = record && record->end;
   // Cancelled, and its replay broken off: the next server repeats all that watchers have seen.
   if (record && end.state == SessionState::kCancelled) {

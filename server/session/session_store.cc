@@ -300,8 +300,7 @@ void SessionStore::Sweep(TimePoint now) {
   AdvanceLocked();
 }
 
-bool SessionStore::Stop(TimePoint deadline) {
-  loader_.Stop();
+bool SessionStore::Stop(TimePoint deadline, const std::function<void()>& on_suspended) {
   std::vector<Entry> all;
   {
     const std::lock_guard lock(mutex_);
@@ -314,6 +313,8 @@ bool SessionStore::Stop(TimePoint deadline) {
     unreplayed_.clear();
   }
   for (Entry& entry : all) entry.session->Suspend();
+  on_suspended();
+  loader_.Stop();
   bool clean = true;
   for (Entry& entry : all) {
     if (!entry.thread.joinable()) continue;

@@ -80,7 +80,9 @@ class SessionStore {
   void Sweep(TimePoint now);
   // Suspends all meshes and waits for their threads until `deadline`. False: some still compute;
   // the process must end without them.
-  bool Stop(TimePoint deadline);
+  // `on_suspended` is called once no mesh can fail any more by what is broken off.
+  bool Stop(
+      TimePoint deadline, const std::function<void()>& on_suspended = [] {});
 
  private:
   struct Entry {

@@ -111,6 +111,7 @@ SERVER = {
         "server/records",
         "server/storage",
     ),
+    "server/postgres": (*FACE, "server/base", "server/records", "server/storage"),
     "server/salvage": (*FACE, "server/base", "server/records", "server/storage"),
     "server/config": (*FACE, "server/base", "server/memory"),
     "server/grpc_parts": ("server/base",),
@@ -159,6 +160,7 @@ SERVER = {
         "server/oracles",
         "server/session",
         "server/journal",
+        "server/postgres",
         "server/salvage",
         "server/grpc_parts",
         "server/net",
@@ -265,6 +267,7 @@ TABLE = Table(
             "clients/view/gateway",
             "tests",
         ),
+        "libpq-fe.h": ("server/postgres",),
         "sqlite3.h": ("server/storage", "tests/server"),
         "nanoflann.hpp": ("clients/cpp/oracles",),
         "boost/": ("clients/view/gateway",),  # the viewer's sockets, and nothing else

@@ -93,6 +93,21 @@ TEST(Config, RefusalsNameTheFlag) {
   expect("--metrics-listen", [](Config* c) { c->metrics_listen = "9090"; });
   expect("--keepalive",
          [](Config* c) { c->keepalive_seconds = std::numeric_limits<double>::infinity(); });
+  expect("--data-dir", [](Config* c) {
+    c->data_dir = "/somewhere";
+    c->database = "postgresql:///meshes";
+  });
+  expect("--database-patience", [](Config* c) { c->database_patience_seconds = -1; });
+}
+
+TEST(Config, MeshesThatAreRecordedMayWaitLong) {
+  Config config;
+  EXPECT_FALSE(IsDurable(config));
+  const double brief = MaxWaitSeconds(config);
+  config.database = "postgresql:///meshes";
+  EXPECT_TRUE(IsDurable(config));
+  EXPECT_EQ(MaxWaitSeconds(config), 30 * 86400.0);
+  EXPECT_LT(brief, MaxWaitSeconds(config));
 }
 
 }  // namespace

@@ -1,0 +1,307 @@
+"""Servers that record their meshes in PostgreSQL: one has the database, others stand by behind HAProxy.
+
+Whatever is killed, frozen or stopped, servers or the database, a mesh ends bit for bit as it would have
+undisturbed. $STELLATE_MESHES: how many are under way at once (3); $STELLATE_RESTARTS: how often the
+database is killed (3); $STELLATE_TAKEOVERS: how often a server is killed or stopped (4).
+"""
+
+from __future__ import annotations
+
+import os
+import pathlib
+import shlex
+import shutil
+import signal
+import socket
+import subprocess
+import threading
+import time
+
+import pytest
+import stellate
+from stellate import manifolds
+
+PATIENCE = 120.0  # seconds: for a hang, not for a measurement
+EPSILON = 0.15
+HAPROXY = shutil.which("haproxy", path=os.environ.get("PATH", "") + ":/usr/sbin") or "haproxy"
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+
+
+def number(name: str, otherwise: int) -> int:
+    return int(os.environ.get(name, otherwise))
+
+
+def wait_for(what) -> None:
+    until = time.monotonic() + PATIENCE
+    while not what():
+        assert time.monotonic() < until, "waited in vain"
+        time.sleep(0.01)
+
+
+def sql(database: str, statement: str) -> str:
+    command = ["psql", database, "--no-psqlrc", "-qtAX", "-v", "ON_ERROR_STOP=1", "-c", statement]
+    return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+
+
+def control(*words: str) -> None:
+    """Stops or starts the database."""
+    command = [*shlex.split(os.environ["STELLATE_TEST_PG_CTL"]), *words]
+    subprocess.run(command, check=True, cwd="/tmp", stdout=subprocess.DEVNULL)
+
+
+class Server:
+    """A stellated without a directory of its own; it listens once it has the database."""
+
+    def __init__(self, folder: pathlib.Path, name: str, url: str) -> None:
+        self.address = f"127.0.0.1:{free_port()}"
+        self._folder, self._name, self._url = folder, name, url
+        self.start()
+
+    def start(self) -> None:
+        self._ready = self._folder / f"{self._name}.ready"
+        self._ready.unlink(missing_ok=True)
+        command = [stellate.server.find_stellated(), "--listen", self.address]
+        command += ["--ready-file", str(self._ready), "--database", self._url]
+        command += ["--exit-with-parent", "--drain-seconds", "0"]
+        with open(self._folder / f"{self._name}.log", "ab") as log:
+            self.process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=log)
+
+    def is_ready(self) -> bool:
+        assert self.process.poll() is None, self.log()
+        return self._ready.exists()
+
+    def log(self) -> str:
+        return (self._folder / f"{self._name}.log").read_text()
+
+    def end(self, how: signal.Signals = signal.SIGKILL) -> int:
+        self.process.send_signal(how)
+        return self.process.wait(PATIENCE)
+
+
+def free_port() -> int:
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        return free.getsockname()[1]
+
+
+def listens(port: int) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
+
+
+@pytest.fixture
+def database(tmp_path):
+    """A new database, by a file that holds its URL."""
+    anything = os.environ["STELLATE_TEST_DATABASE"]
+    name = f"takeover_{os.getpid()}_{abs(hash(tmp_path))}"
+    sql(anything, f"CREATE DATABASE {name}")
+    url = anything.replace("/postgres?", f"/{name}?")
+    (tmp_path / "url").write_text(url + "\n")
+    (tmp_path / "url").chmod(0o600)
+    return url
+
+
+@pytest.fixture
+def servers(tmp_path, database):
+    """Starts servers of the database; the last line of defence against those left over."""
+    started: list[Server] = []
+
+    def start(name: str) -> Server:
+        started.append(Server(tmp_path, name, str(tmp_path / "url")))
+        return started[-1]
+
+    yield start
+    for server in started:
+        if server.process.poll() is None:
+            server.process.send_signal(signal.SIGCONT)
+            server.end()
+
+
+@pytest.fixture
+def front(tmp_path):
+    """Has HAProxy, as docker/postgres configures it, lead to whichever of two servers listens."""
+    started = []
+
+    def start(*servers: Server) -> str:
+        port = free_port()
+        text = (ROOT / "docker/postgres/haproxy.cfg").read_text()
+        assert text.count("bind :7717") == 1
+        (tmp_path / "haproxy.cfg").write_text(text.replace("bind :7717", f"bind 127.0.0.1:{port}"))
+        environment = {f"STELLATED_{i}": server.address for i, server in enumerate(servers)}
+        command = [HAPROXY, "-db", "-f", str(tmp_path / "haproxy.cfg")]
+        started.append(subprocess.Popen(command, env=environment, stdout=subprocess.DEVNULL))
+        wait_for(lambda: listens(port))
+        return f"127.0.0.1:{port}"
+
+    yield start
+    for process in started:
+        process.kill()
+        process.wait(PATIENCE)
+
+
+class Gated(manifolds.Torus):
+    """A torus that says when its fifth batch has come, and then waits until it may go on."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._batches, self.reached, self.go = 0, threading.Event(), threading.Event()
+
+    def closest_point(self, points):
+        self._batches += 1
+        if self._batches == 5:
+            self.reached.set()
+            assert self.go.wait(PATIENCE)
+        return super().closest_point(points)
+
+
+class Made(threading.Thread):
+    """A mesh on its way in a thread: its one worker, and its watcher."""
+
+    def __init__(self, address: str) -> None:
+        super().__init__(daemon=True)
+        self._address, self.oracle = address, Gated()
+        self.mesh: stellate.Mesh | None = None
+        self.error: Exception | None = None
+        self.start()
+
+    def run(self) -> None:
+        try:
+            with stellate.Client(self._address, reconnect_seconds=PATIENCE) as client:
+                self.mesh = stellate.mesh(self.oracle, EPSILON, server=client)
+        except Exception as error:  # shown by who waits for it
+            self.error = error
+
+    def reach(self) -> None:
+        wait_for(lambda: self.oracle.reached.is_set() or not self.is_alive())
+        assert self.oracle.reached.is_set(), self.error
+
+
+@pytest.fixture(scope="module")
+def undisturbed():
+    with stellate.Server() as server, stellate.Client(server) as client:
+        return stellate.mesh(manifolds.Torus(), EPSILON, server=client)
+
+
+def finish(meshes: list[Made], expected: stellate.Mesh) -> None:
+    for made in meshes:
+        made.oracle.go.set()
+    for made in meshes:
+        made.join(PATIENCE)
+        assert made.mesh is not None, made.error or "it does not end"
+        assert made.mesh.certified
+        assert made.mesh.points.tobytes() == expected.points.tobytes()
+        assert made.mesh.simplices.tobytes() == expected.simplices.tobytes()
+
+
+def test_a_server_killed_and_started_again_needs_no_directory(servers, undisturbed):
+    server = servers("only")
+    wait_for(server.is_ready)
+    with stellate.Client(server.address) as client:
+        finished = client.create(manifolds.Torus(), EPSILON)
+        client.serve(manifolds.Torus(), finished.name)
+    made = Made(server.address)
+    made.reach()
+    server.end()
+    server.start()
+    finish([made], undisturbed)
+    with stellate.Client(server.address) as client:  # no worker, no replay
+        kept = stellate.download(finished.name, server=client)
+        assert kept.points.tobytes() == undisturbed.points.tobytes()
+        assert client.get(finished.name).state == "SUCCEEDED"
+
+
+def test_another_server_ends_the_meshes_of_one_that_is_killed(servers, front, undisturbed):
+    first = servers("first")
+    wait_for(first.is_ready)
+    second = servers("second")
+    address = front(first, second)
+    meshes = [Made(address) for _ in range(number("STELLATE_MESHES", 3))]
+    for made in meshes:
+        made.reach()
+    assert not second.is_ready(), "one at a time"
+    first.end()
+    wait_for(second.is_ready)
+    finish(meshes, undisturbed)
+    assert "standing by" in second.log()
+
+
+def test_servers_that_come_and_go_lose_no_mesh(servers, front, undisturbed):
+    pair = [servers("first"), servers("second")]
+    address = front(*pair)
+    for turn in range(number("STELLATE_TAKEOVERS", 4)):
+        wait_for(lambda: any(server.is_ready() for server in pair))
+        has = next(server for server in pair if server.is_ready())
+        made = Made(address)
+        made.reach()
+        # A stop lets the other have the database at once; a kill, once it has been silent.
+        has.end(signal.SIGTERM if turn % 2 == 0 else signal.SIGKILL)
+        has.start()
+        finish([made], undisturbed)
+
+
+def test_a_frozen_server_changes_nothing_once_another_took_over(
+    servers, front, undisturbed, database
+):
+    first = servers("first")
+    wait_for(first.is_ready)
+    second = servers("second")
+    address = front(first, second)
+    made = Made(address)
+    made.reach()
+    first.process.send_signal(signal.SIGSTOP)
+    wait_for(second.is_ready)
+    term = sql(database, "SELECT term FROM stellate.cluster")
+    finish([made], undisturbed)
+    first.process.send_signal(signal.SIGCONT)
+    assert first.process.wait(PATIENCE) == 1
+    assert "another server has taken the database" in first.log()
+    assert sql(database, "SELECT term FROM stellate.cluster") == term
+
+
+def test_a_database_that_is_killed_moves_no_mesh(servers, undisturbed, database):
+    server = servers("first")
+    wait_for(server.is_ready)
+    other = servers("second")
+    wait_for(lambda: "standing by" in other.log())
+    for _ in range(number("STELLATE_RESTARTS", 3)):
+        made = Made(server.address)
+        made.reach()
+        control("stop", "-m", "immediate")
+        made.oracle.go.set()
+        time.sleep(0.5)  # writes, which wait
+        assert made.is_alive()
+        control("start")
+        finish([made], undisturbed)
+    assert sql(database, "SELECT term FROM stellate.cluster") == "1"
+    assert not other.is_ready()
+    assert "the database is back" in server.log()
+
+
+def test_a_server_without_its_database_can_be_stopped(servers):
+    server = servers("first")
+    wait_for(server.is_ready)
+    other = servers("second")
+    wait_for(lambda: "standing by" in other.log())
+    made = Made(server.address)
+    made.reach()
+    control("stop", "-m", "immediate")
+    try:
+        made.oracle.go.set()
+        time.sleep(0.5)
+        assert server.end(signal.SIGTERM) == 0
+        assert other.end(signal.SIGTERM) == 0, "one that stands by, too"
+    finally:
+        control("start")
+
+
+def test_refusals(tmp_path):
+    def refusal(*flags: str) -> str:
+        command = [stellate.server.find_stellated(), "--listen", "127.0.0.1:0", *flags]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
+        assert done.returncode == 2
+        return done.stderr
+
+    url = os.environ["STELLATE_TEST_DATABASE"]
+    assert "give one of them" in refusal("--database", url, "--data-dir", str(tmp_path))
+    assert "write the URL into a file" in refusal("--database", "postgresql://a:b@/c")
+    assert "does not answer" in refusal("--database", url.replace("/postgres?", "/nothing?"))
