@@ -1,10 +1,13 @@
-"""Meshes in PyVista, trimesh and Open3D: these see the surface that we see."""
+"""Meshes in PyVista, trimesh, Open3D and scikit-fem: these see the surface that we see."""
+
+import re
 
 import numpy as np
 import pytest
 import pyvista
 import shapes
 import stellate
+import trimesh
 
 
 def area(mesh):
@@ -86,3 +89,29 @@ def test_open3d_finds_the_torus_closed():
 def test_what_a_library_cannot_hold_is_refused(convert, mesh):
     with pytest.raises(stellate.InvalidArgument, match="takes meshes with k in"):
         getattr(mesh, convert)()
+
+
+def test_scenes_are_read_by_trimesh_and_open3d(tmp_path):
+    open3d = pytest.importorskip("open3d")
+    torus = shapes.torus()
+    torus.save(tmp_path / "torus.glb")
+    (part,) = trimesh.load(tmp_path / "torus.glb").geometry.values()
+    assert part.is_watertight and part.volume > 0
+    assert np.isclose(part.area, area(torus), rtol=1e-5, atol=0)
+    read = open3d.io.read_triangle_mesh(str(tmp_path / "torus.glb"))
+    assert len(read.triangles) == len(torus.simplices) and read.has_vertex_normals()
+
+
+def test_scikit_fem_hears_the_drum_of_the_page(tmp_path, monkeypatch, repository):
+    """Gradients along the boundary of a solid are those of the mesh of its boundary."""
+    monkeypatch.chdir(tmp_path)
+    page = (repository / "docs" / "fields" / "elements.md").read_text()
+    known = {}
+    for block in re.findall(r"^```python\n(.*?)^```", page, re.M | re.S):
+        exec(block, known)
+    solid, dome, tets = known["solid"], known["dome"], known["tets"]
+    mesh = stellate.Mesh(solid.points, np.sort(tets.facets[:, dome].T, axis=1))
+    assert len(mesh.simplices) == len(solid.boundary[0].simplices)
+    stiffness, _ = mesh.laplacian()
+    assert np.abs(known["K"] - stiffness).max() < 1e-9
+    assert np.isclose(known["M"].sum(), mesh.area, rtol=1e-9, atol=0)
