@@ -73,6 +73,7 @@ def mesh(
     checkpoint: str | os.PathLike[str] | None = None,
     save: Path | Sequence[Path] = (),
     keep: Keep | None = None,
+    keep_on_server: bool = False,
     **options: Unpack[MeshOptions],
 ) -> FinishedMesh:
     """Meshes the manifold that an oracle knows.
@@ -99,6 +100,9 @@ def mesh(
       keep: "box": what lies in the oracle's bounding box, cut at its sides where the manifold leaves
         it; "seeds": the components that seeds lie on, and no other. What is meshed is
         oracles.kept(oracle, keep, seeds): workers that join have to serve that.
+      keep_on_server: a finished mesh stays on `server`, as the mesh's `name`, for stellate.download and
+        viewers, until somebody deletes it or the server's `keep-finished-seconds`, an hour by default,
+        are over, or its `keep-finished-meshes` newer ones are there.
       **options: those below; one that is left out, or None, takes its default.
 
     Keyword Args:
@@ -118,6 +122,11 @@ def mesh(
       not wait for that.
     """
     files = [save] if isinstance(save, (str, os.PathLike)) else list(save)
+    if keep_on_server and server is None:
+        raise InvalidArgument(
+            "keep_on_server is for a server that is named: a private one ends with the call. To keep the "
+            "mesh without one, save it"
+        )
     checked = CheckedOracle(oracle)
     for file in files:
         dimension = checked.dimension - bool(options.get("boundary_only"))
@@ -146,6 +155,7 @@ def mesh(
                 keep=keep,
                 every=False,
                 checkpoint=kept,
+                stays=keep_on_server,
             )
         )
         interrupts.on_first = session.interrupt

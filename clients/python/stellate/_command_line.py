@@ -149,12 +149,14 @@ def _mesh(options: argparse.Namespace) -> int:
     label = _short(f"stellate {name_of(options)}")
     try:
         with contextlib.ExitStack() as stack:
-            finished = mesh(
+            finished = made = mesh(
                 oracle, options.epsilon,
                 None if options.server is None else stack.enter_context(_connected(options)),
                 _bar(options), save=options.output, label=label, checkpoint=options.checkpoint,
-                **settings,
+                keep_on_server=options.keep, **settings,
             )  # fmt: skip
+        if options.keep:
+            print(f"stellate: it stays on {options.server} as {made.name}", file=sys.stderr)
     except Interrupted as stopped:
         if stopped.mesh is None:
             raise
@@ -295,6 +297,10 @@ def _parser(by_command: bool) -> argparse.ArgumentParser:
     one.add_argument(
         "--checkpoint", metavar="FOLDER",
         help="in which the mesh outlives this program: the same command goes on with it",
+    )  # fmt: skip
+    one.add_argument(
+        "--keep", action="store_true",
+        help="the finished mesh stays on --server, for `download` and viewers; its name is said",
     )  # fmt: skip
     _add_results(one, required=False)
     _add_connection(one, None)

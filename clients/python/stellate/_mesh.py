@@ -48,6 +48,8 @@ class Mesh:
       region_names: the names of the labels 1, 2, ..., as the oracle gave them; "" where there is none.
       smoothed: of a reconstruction from noisy points, (n, d): the positions that the complex was built on
         and that its certificate is about; None where they are the points.
+      name: by which it is on its server still, "meshes/...", where it was asked to stay
+        (`stellate.mesh(..., keep_on_server=True)`); else "".
     """
 
     points: np.ndarray
@@ -61,6 +63,7 @@ class Mesh:
     places: np.ndarray | None = None
     smoothed: np.ndarray | None = None
     region_names: tuple[str, ...] = ()
+    name: str = ""
 
     def region(self, label: int | str) -> Mesh:
         """The part with one label, or with that name, of the same points. Its boundary is where it ends
@@ -487,6 +490,7 @@ def with_report(mesh: Mesh, report: Report | None) -> Mesh:
         mesh.places,
         mesh.smoothed,
         mesh.region_names,
+        mesh.name,
     )
 
 

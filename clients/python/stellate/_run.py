@@ -109,8 +109,8 @@ class _Live:
 class Run:
     """A mesh that is created, served and watched, as a context manager.
 
-    Leaving it early cancels the mesh; leaving it at all deletes the mesh from the server. With a
-    checkpoint it stays there until it is finished.
+    Leaving it early cancels the mesh; leaving it at all deletes the mesh from the server, unless it is
+    finished and stays. With a checkpoint it stays there until it is finished.
     """
 
     def __init__(
@@ -125,8 +125,11 @@ class Run:
         every: bool = True,
         checkpoint: Checkpoint | None = None,
         ask: Ask = answer,
+        stays: bool = False,
     ) -> None:
         """`keep`: see oracles.kept.
+
+        `stays`: a finished mesh is not deleted from its server, and says by what name it is there.
 
         `every`: iterating gives the mesh at every revision, and not only when it is finished.
 
@@ -150,7 +153,7 @@ class Run:
         choice: Choice = choose
         if checkpoint is not None:
             choice = checkpoint.choose_epsilon
-        self._on_progress, self._checkpoint = on_progress, checkpoint
+        self._on_progress, self._checkpoint, self._stays = on_progress, checkpoint, stays
         self._epsilon_reason = ""
         self._where_it_ends: Callable[[], str] | None = getattr(oracle, "where_it_ends", None)
         chosen = self._say(
@@ -359,7 +362,8 @@ class Run:
                 report = report.refused(f"{end}. The run ended as NO_PROGRESS")
         if self._epsilon_reason:
             report = dataclasses.replace(report, epsilon_reason=self._epsilon_reason)
-        return dataclasses.replace(mesh, report=report)
+        name = self._at_work.info.name if self._stays else ""
+        return dataclasses.replace(mesh, report=report, name=name)
 
     def __enter__(self) -> Run:
         return self
@@ -390,7 +394,7 @@ class Run:
             else:
                 live.workers.stop()
             live.workers.join(_FAREWELL_SECONDS)
-        if self._checkpoint is None:
+        if self._checkpoint is None and not (self._stays and self._ended):
             try:
                 live.client.delete(live.info.name, wait=False)
             except StellateError:

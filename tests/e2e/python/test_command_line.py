@@ -141,6 +141,17 @@ def test_programs_serve_what_was_declared(shell, server, repository):
     assert (served.returncode, served.stdout) == (0, "SUCCEEDED\n"), served.stderr
 
 
+def test_a_mesh_is_kept_on_its_server(shell, server, tmp_path):
+    at = ("--server", server.address)
+    done = shell("mesh", "shapes:torus", "-e", "0.3", "-q", "--keep", "-o", "a.txt", *at)
+    assert done.returncode == 0 and "it stays on" in done.stderr, done.stderr
+    again = stellate.download(done.stderr.split()[-1], server=server)
+    kept = stellate.load_txt(tmp_path / "a.txt")
+    assert again.points.tobytes() == kept.points.tobytes()
+    alone = shell("mesh", "shapes:torus", "-e", "0.3", "-q", "--keep")
+    assert alone.returncode == 2 and "a private one ends" in alone.stderr
+
+
 @pytest.mark.parametrize(
     "arguments, words",
     [

@@ -45,6 +45,32 @@ def test_a_finished_mesh_is_fetched_with_its_report(finished, server, tmp_path):
     assert_same(stellate.download(name, server=server), watched)  # it is still there
 
 
+def test_a_mesh_that_was_asked_to_stay_is_there_until_it_is_deleted(server, client):
+    made = stellate.mesh(manifolds.Torus(), 0.3, server=server, keep_on_server=True)
+    again = stellate.download(made.name, server=server)
+    assert_same(again, made)
+    assert again.report.certified
+    client.delete(made.name)
+    with pytest.raises(stellate.MeshNotFound, match="deleted, or it ended too long ago"):
+        stellate.download(made.name, server=server)
+    before = {info.name for info in client.list()}
+    gone = stellate.mesh(manifolds.Torus(), 0.3, server=server)
+    assert gone.name == "" and {info.name for info in client.list()} == before
+    with pytest.raises(stellate.InvalidArgument, match="a private one ends"):
+        stellate.mesh(manifolds.Torus(), 0.3, keep_on_server=True)
+
+
+def test_what_does_not_finish_does_not_stay(server, client):
+    before = {info.name for info in client.list()}
+
+    def stop(progress):
+        raise KeyError("enough")
+
+    with pytest.raises(KeyError):
+        stellate.mesh(manifolds.Torus(), 0.05, server=server, on_progress=stop, keep_on_server=True)
+    assert {info.name for info in client.list()} <= before
+
+
 def test_what_a_format_cannot_hold_is_refused_before_anything_is_waited_for(client, tmp_path):
     name = client.create(manifolds.SpecialOrthogonal3(), 0.4).name  # which nobody serves
     with pytest.raises(stellate.SaveError, match="surfaces"):
