@@ -120,6 +120,7 @@ class Server::Impl {
         state.authenticator->Reload();  // before the streams ask it
         state.streams.Tick(now);
         state.store.Sweep(now);
+        if (state.journal != nullptr) state.metrics.DatabaseAnswers(!state.journal->IsAway());
         LogLeftOut();
       }
     });

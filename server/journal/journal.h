@@ -59,6 +59,8 @@ class Journal {
   void StopWaiting() { shared_->StopWaiting(); }
   // Another server has taken the records, and its meshes with them. Any thread.
   bool IsLost() const { return shared_->AreLost(); }
+  // What keeps the records does not answer, and meshes wait for it. Any thread.
+  bool IsAway() const { return shared_->AreAway(); }
 
   // Bytes of the records of an owner's meshes; the file is larger by about a twentieth.
   std::uint64_t OwnerBytes(const std::string& owner) const { return shared_->OwnerBytes(owner); }

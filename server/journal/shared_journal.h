@@ -51,6 +51,8 @@ class SharedJournal {
   void StopWaiting() { records_->StopWaiting(); }
   // Another server has taken the records. Any thread.
   bool AreLost() const { return records_->AreLost(); }
+  // What keeps the records does not answer. Any thread.
+  bool AreAway() const { return records_->AreAway(); }
   void StartThreads();
   // Tries once more whatever is due.
   void StopThreads();

@@ -141,6 +141,12 @@ class Metrics::Impl final : public SessionObserver {
           .Name("stellate_limit_refusals_total")
           .Help("Calls refused as a limit was reached, by the setting that bounds it")
           .Register(*registry);
+  prometheus::Gauge& database =
+      prometheus::BuildGauge()
+          .Name("stellate_database_up")
+          .Help("1 while the database of the meshes' records answers, or where there is none")
+          .Register(*registry)
+          .Add({}, 1);
   prometheus::Histogram& latency =
       prometheus::BuildHistogram()
           .Name("stellate_answer_seconds")
@@ -198,6 +204,7 @@ void Metrics::StopListening() { impl_->pages.reset(); }
 std::shared_ptr<SessionObserver> Metrics::observer() const { return impl_; }
 
 void Metrics::Answered(double seconds) { impl_->latency.Observe(seconds); }
+void Metrics::DatabaseAnswers(bool yes) { impl_->database.Set(yes ? 1 : 0); }
 void Metrics::Refused() { impl_->refused.Increment(); }
 void Metrics::LimitReached(const std::string& setting) {
   impl_->limits.Add({{"limit", setting}}).Increment();

@@ -35,6 +35,7 @@ class Metrics {
 
   // Oracle streams: a chunk was answered, `seconds` after it was sent.
   void Answered(double seconds);
+  void DatabaseAnswers(bool yes);
   void Refused();                                 // a call came without a good token
   void LimitReached(const std::string& setting);  // a call was refused by that limit
   // Bytes of messages on streams, before compression and framing.

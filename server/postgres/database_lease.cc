@@ -18,6 +18,7 @@ using core::StatusCode;
 using Outcome = Connection::Outcome;
 
 constexpr auto kPause = std::chrono::milliseconds(250);
+constexpr auto kSilence = 3 * kBeat;  // of a database, until it counts as away
 
 constexpr char kSee[] =
     "SELECT term, beats, held, holder, format, EXISTS (SELECT FROM stellate.records) "
@@ -153,6 +154,8 @@ void DatabaseLease::NoteLoss() {
       "more");
 }
 
+bool DatabaseLease::IsAnswered() const { return Clock::now() - last_beat_.load() < kSilence; }
+
 // A beat that the database does not take is tried again with the next.
 void DatabaseLease::Beat(const std::stop_token& stop) {
   std::mutex mutex;
@@ -170,6 +173,8 @@ void DatabaseLease::Beat(const std::stop_token& stop) {
       connection_.reset();
     } else if (rows.count() == 0) {
       return NoteLoss();
+    } else {
+      last_beat_ = Clock::now();
     }
   }
 }

@@ -40,6 +40,8 @@ class DatabaseLease {
   // Another server has taken it. Any thread.
   bool IsLost() const { return lost_; }
   void NoteLoss();
+  // Its last beats were taken. Any thread.
+  bool IsAnswered() const;
 
  private:
   DatabaseLease(std::string url, std::unique_ptr<Connection> connection, std::int64_t term);
@@ -49,6 +51,7 @@ class DatabaseLease {
   std::unique_ptr<Connection> connection_;  // null: broken
   const std::int64_t term_;
   std::atomic<bool> lost_{false}, stopping_{false};
+  std::atomic<TimePoint> last_beat_{Clock::now()};  // that was taken
   std::jthread beating_;
 };
 

@@ -47,6 +47,7 @@ class PostgresRecords final : public Records {
   Trouble trouble() const override { return trouble_; }
   void StopWaiting() override { stopping_ = true; }
   bool AreLost() const override { return lease_->IsLost(); }
+  bool AreAway() const override { return !lease_->IsAnswered(); }
 
  private:
   PostgresRecords(std::string url, std::unique_ptr<DatabaseLease> lease, const Options& options)

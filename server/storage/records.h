@@ -24,7 +24,7 @@ struct StoredMesh {
 };
 
 // Sealed records by place, whatever their meaning, on a disk or in a database. One thread at a
-// time, except StopWaiting and AreLost. After a call that returned false, trouble() says why, and
+// time, except where it says so. After a call that returned false, trouble() says why, and
 // Abandon() must be called before the next.
 class Records {
  public:
@@ -67,6 +67,8 @@ class Records {
   // Another server has taken the records. Writes wait from then on, until StopWaiting, so that no
   // client hears of a failure of meshes that go on there. Any thread.
   virtual bool AreLost() const { return false; }
+  // What keeps them does not answer. Any thread.
+  virtual bool AreAway() const { return false; }
 
   // What a file needs now and then, and a database sees to by itself.
   virtual bool HasSpaceToGiveBack() { return false; }

@@ -16,6 +16,7 @@ import socket
 import subprocess
 import threading
 import time
+import urllib.request
 
 import pytest
 import stellate
@@ -63,12 +64,18 @@ class Server:
         command = [stellate.server.find_stellated(), "--listen", self.address]
         command += ["--ready-file", str(self._ready), "--database", self._url]
         command += ["--exit-with-parent", "--drain-seconds", "0"]
+        self._metrics = f"127.0.0.1:{free_port()}"
+        command += ["--metrics-listen", self._metrics]
         with open(self._folder / f"{self._name}.log", "ab") as log:
             self.process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=log)
 
     def is_ready(self) -> bool:
         assert self.process.poll() is None, self.log()
         return self._ready.exists()
+
+    def sees_database(self) -> bool:
+        with urllib.request.urlopen(f"http://{self._metrics}/metrics") as page:
+            return "\nstellate_database_up 1\n" in page.read().decode()
 
     def log(self) -> str:
         return (self._folder / f"{self._name}.log").read_text()
@@ -270,11 +277,52 @@ def test_a_database_that_is_killed_moves_no_mesh(servers, undisturbed, database)
         made.oracle.go.set()
         time.sleep(0.5)  # writes, which wait
         assert made.is_alive()
+        wait_for(lambda: not server.sees_database())
         control("start")
         finish([made], undisturbed)
+        wait_for(server.sees_database)
     assert sql(database, "SELECT term FROM stellate.cluster") == "1"
     assert not other.is_ready()
     assert "the database is back" in server.log()
+
+
+def test_a_standby_of_the_database_takes_its_place(servers, undisturbed, database, tmp_path):
+    """With a synchronous standby, promoted when the first is gone, nothing is lost and none moves."""
+    words = shlex.split(os.environ["STELLATE_TEST_PG_CTL"])
+    at = words.index("--pgdata")
+    programs, folder = pathlib.Path(words[at - 1]).parent, pathlib.Path(words[at + 1]).parent
+    standby = folder / "standby"
+
+    def run(program: str, *arguments: str) -> None:
+        command = [*words[: at - 1], str(programs / program), "--pgdata", str(standby), *arguments]
+        subprocess.run(command, check=True, cwd=folder, stdout=subprocess.DEVNULL)
+
+    origin = ["--host", str(folder), "--username", "stellate"]
+    run("pg_basebackup", *origin, "--write-recovery-conf", "--checkpoint", "fast")
+    steer = ["--wait", "--silent", "--log", str(standby / "log")]
+    run("pg_ctl", *steer, "--options", "-c port=5433", "start")
+    try:
+        sql(database, "ALTER SYSTEM SET synchronous_standby_names = '*'")
+        sql(database, "SELECT pg_reload_conf()")
+        wait_for(lambda: sql(database, "SELECT sync_state FROM pg_stat_replication") == "sync")
+        both = database.replace(f"host={folder}", f"host={folder},{folder}&port=5432,5433")
+        (tmp_path / "url").write_text(both + "&target_session_attrs=read-write")
+        server = servers("first")
+        wait_for(server.is_ready)
+        made = Made(server.address)
+        made.reach()
+        control("stop", "-m", "immediate")
+        made.oracle.go.set()
+        run("pg_ctl", *steer, "promote")
+        finish([made], undisturbed)
+        assert sql(f"{database}&port=5433", "SELECT term FROM stellate.cluster") == "1"
+        assert server.end(signal.SIGTERM) == 0
+    finally:
+        run("pg_ctl", *steer, "stop", "-m", "immediate")
+        shutil.rmtree(standby)
+        control("start")
+        sql(database, "ALTER SYSTEM RESET synchronous_standby_names")
+        sql(database, "SELECT pg_reload_conf()")
 
 
 def test_a_server_without_its_database_can_be_stopped(servers):
