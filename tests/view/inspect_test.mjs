@@ -1,7 +1,10 @@
 // `stellate view` in a real browser: what is read off a mesh, by pointer, keyboard and file.
 import assert from "node:assert/strict";
-import { readFileSync } from "node:fs";
+import { once } from "node:events";
+import { readFileSync, statSync } from "node:fs";
+import { join } from "node:path";
 import { test } from "node:test";
+import { pathToFileURL } from "node:url";
 import { finished, hues, picture, setStage, still, until } from "./stage.mjs";
 import { choose } from "./walk.mjs";
 
@@ -242,7 +245,7 @@ test("the keyboard turns it, and everything has a name", async () => {
 test("in more dimensions than three a mesh turns by itself, unless one minds", async () => {
   const name = await stage.mesh({ shape: "flat torus", epsilon: 0.7, label: "three" });
   const page = await stage.look(name, () => {}, true);
-  await until(page, () => document.getElementById("stage").dataset.simplices !== "0");
+  await until(page, () => Number(document.getElementById("stage").dataset.simplices) > 0);
   assert.ok(await page.locator("#tour").isChecked());
   const digests = new Set();
   await page.waitForTimeout(1000);
@@ -259,4 +262,72 @@ test("in more dimensions than three a mesh turns by itself, unless one minds", a
   const quiet = await stage.look(name);
   await finished(quiet);
   assert.ok(!(await quiet.locator("#tour").isChecked()));
+});
+
+test("two meshes side by side are turned together", async () => {
+  await stage.mesh({ shape: "torus", epsilon: 0.3, label: "coarse" });
+  const page = await see({ shape: "torus", epsilon: 0.15, label: "fine" });
+  const alone = await picture(page);
+  const other = () =>
+    page.evaluate(() => {
+      const canvas = document.getElementById("beside-canvas");
+      const copy = new OffscreenCanvas(120, 120).getContext("2d");
+      copy.drawImage(canvas, 0, 0, 120, 120);
+      const { data } = copy.getImageData(0, 0, 120, 120);
+      let [ink, digest] = [0, 0];
+      for (let i = 0; i < data.length; i += 4) {
+        if (Math.abs(data[i] - data[0]) > 12) ink++;
+        digest = (Math.imul(digest, 31) + data[i]) | 0;
+      }
+      return { ink: ink / (120 * 120), digest };
+    });
+  await page.locator("#beside").selectOption({ label: "coarse" });
+  await until(page, () =>
+    /coarse.*simplices/s.test(document.getElementById("beside-facts").textContent),
+  );
+  await still(page);
+  await until(page, () => document.getElementById("stage").ariaBusy === "false");
+  const [left, right] = [await picture(page), await other()];
+  assert.ok(left.share > 0.05 && right.ink > 0.05, `${left.share}, ${right.ink}`);
+  assert.ok(Math.abs(left.share - right.ink) < 0.03, "as large, and from the same side");
+
+  await page.locator("#canvas").focus();
+  for (let i = 0; i < 4; i++) await page.keyboard.press("ArrowDown");
+  const [turned, followed] = [await picture(page), await other()];
+  assert.notEqual(turned.digest, left.digest);
+  assert.notEqual(followed.digest, right.digest);
+  assert.ok(Math.abs(turned.share - followed.ink) < 0.03);
+  await page.locator("#colour").selectOption("size");
+  await still(page);
+  assert.notEqual((await other()).digest, followed.digest, "coloured alike");
+
+  await page.locator("#beside").selectOption("");
+  await page.locator("#colour").selectOption("plain");
+  await page.locator("#fit").click();
+  assert.ok(await page.locator("#beside-canvas").isHidden());
+  assert.ok((await picture(page)).sides[0] > 0.9 * alone.sides[0], "it has all the room again");
+});
+
+test("a file of five thousand vertices has less than 3 MB, and its revisions", async () => {
+  const name = await stage.mesh({ shape: "torus", epsilon: 0.0385, label: "many" });
+  const file = join(stage.folder, "many.html");
+  const view = stage.spawn(process.env.STELLATE, [
+    "view",
+    name,
+    "--server",
+    stage.address,
+    "--html",
+    file,
+  ]);
+  assert.deepEqual((await once(view, "exit"))[0], 0);
+  assert.ok(statSync(file).size < 3e6, `${statSync(file).size} bytes`);
+  const page = await stage.page(pathToFileURL(file).href);
+  await finished(page);
+  const { vertices, revision, share } = await picture(page);
+  assert.ok(vertices > 5000, `${vertices} vertices`);
+  await page.locator("#revision").fill(`${Math.floor(revision / 2)}`);
+  await until(page, (r) => Number(document.getElementById("stage").dataset.revision) < r, revision);
+  const earlier = await picture(page);
+  assert.ok(earlier.vertices > 10 && earlier.vertices < vertices);
+  assert.ok(earlier.share > 0.5 * share, "it is drawn");
 });

@@ -25,7 +25,9 @@
 namespace stellate::view {
 namespace {
 
-constexpr double kMostBytes = 16e6;                             // of earlier revisions
+// Of earlier revisions: as much as the mesh itself, within these.
+constexpr double kLeastBytes = 1.2e6;
+constexpr double kMostBytes = 16e6;
 constexpr std::size_t kMostFileBytes = std::size_t{500} << 20;  // a browser's longest text
 constexpr std::chrono::seconds kSilence{60};
 
@@ -184,15 +186,20 @@ class Recorder {
     Begin("DownloadMesh", revision);
     auto ok = Read<v1::DownloadMeshRequest, v1::DownloadMeshResponse>(
         request, [this](auto* context, const auto& r) { return stub_->DownloadMesh(context, r); },
-        [this](v1::DownloadMeshResponse* part) { Add(*part); });
+        [this](v1::DownloadMeshResponse* part) {
+          part->clear_points();  // the first of those that the newest revision has
+          Add(*part);
+        });
     End();
     return ok;
   }
 
   // Those at which something came, as many as fit.
   std::vector<std::uint64_t> Revisions() const {
-    const double point = 8.0 * status_.spec().ambient_dimension();
-    const double simplex = 4.0 * (status_.spec().dimension() + 1);
+    const auto bytes_of = [this](const v1::Progress& progress) {
+      return 4.0 / 3 * 4.0 * (status_.spec().dimension() + 1) *
+             static_cast<double>(progress.simplices());
+    };
     std::vector<std::uint64_t> revisions;
     double bytes = 0;
     std::uint64_t vertices = status_.progress().vertices();
@@ -200,13 +207,12 @@ class Recorder {
       const v1::PastProgress& past = status_.past_progress(i);
       if (past.progress().vertices() == vertices) continue;  // the same mesh as the next
       vertices = past.progress().vertices();
-      bytes += 4.0 / 3 *
-               (point * static_cast<double>(vertices) +
-                simplex * static_cast<double>(past.progress().simplices()));
+      bytes += bytes_of(past.progress());
       revisions.push_back(past.revision());
     }
     std::reverse(revisions.begin(), revisions.end());
-    const auto step = static_cast<size_t>(1 + bytes / kMostBytes);
+    const double most = std::clamp(bytes_of(status_.progress()), kLeastBytes, kMostBytes);
+    const auto step = static_cast<size_t>(1 + bytes / most);
     std::vector<std::uint64_t> some;
     for (size_t i = 0; i < revisions.size(); i += step) some.push_back(revisions[i]);
     return some;

@@ -17,7 +17,7 @@ struct RecordOptions {
 
 // Writes a finished mesh as one file that shows it, without a server: the viewer's page with all
 // that it would ask for, in the messages that this server gave. One that grows is waited for. Of
-// earlier revisions as many as take about 16 MB, evenly.
+// earlier revisions, evenly, as many as take no more room than the mesh, or 1.2 MB; at most 16 MB.
 Expected<void> WriteRecording(const std::string& mesh, const std::string& path,
                               const RecordOptions& options);
 

@@ -3,6 +3,7 @@ import uPlot from "uplot";
 import "uplot/dist/uPlot.min.css";
 import type { Histogram } from "./measure";
 import type { PastRow } from "./messages";
+import { css } from "./page";
 
 const kRules = [
   { key: "size", name: "R1 size", colour: "#2563eb" },
@@ -11,7 +12,6 @@ const kRules = [
   { key: "inconsistent", name: "R4 inconsistent", colour: "#dc2626" },
 ] as const;
 
-const css = (name: string) => getComputedStyle(document.documentElement).getPropertyValue(name);
 const short = (n: number) =>
   Math.abs(n) >= 1e6 ? `${n / 1e6}M` : Math.abs(n) >= 1e4 ? `${n / 1e3}k` : `${n}`;
 

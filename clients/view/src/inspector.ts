@@ -2,11 +2,10 @@
 import type { Found, Told } from "./messages";
 import { element } from "./panels";
 import type { View } from "./scene";
+import { at } from "./page";
 
 const kRest = 0.08; // seconds
 const kStill = 4; // pixels: further, and what was pressed was turned
-
-const at = <T extends HTMLElement>(id: string) => document.getElementById(id) as T;
 
 function drawRows(host: HTMLElement, { rows }: Found) {
   host.replaceChildren(

@@ -1,13 +1,13 @@
 // The page: what is chosen, and what of it is shown where.
 import "./style.css";
 import "./stage.css";
+import { Beside, overlayOn } from "./beside";
 import { Curves, Histograms } from "./charts";
 import { choicesOf, coordinateName, coordinates } from "./choices";
 import { Inspector } from "./inspector";
 import { listenToKeys } from "./keys";
 import { axesFrame, Tour, type Colour, type Look, type Part } from "./look";
 import type { FaultKind, Format, FromWorker, MeshRow, Told, ToWorker } from "./messages";
-import { Overlay } from "./overlay";
 import {
   badgeOf,
   drawWorkers,
@@ -26,6 +26,7 @@ import { View } from "./scene";
 import type { Recording } from "./source";
 import { Time } from "./time";
 import MeshWorker from "./worker?worker&inline";
+import { at, css } from "./page";
 
 const kTourSeconds = 0.05;
 
@@ -49,10 +50,6 @@ const kCannotDraw =
   "This browser cannot draw the mesh: it has no WebGL, or WebGL is switched off in its settings. " +
   "Certificate and figures are beside this.";
 
-const at = <T extends HTMLElement>(id: string) => document.getElementById(id) as T;
-const css = (name: string) =>
-  getComputedStyle(document.documentElement).getPropertyValue(name).trim();
-
 const worker = new MeshWorker();
 const ask = (message: ToWorker) => worker.postMessage(message);
 let asked = 0; // times that something else was to be seen
@@ -68,18 +65,20 @@ function askToSee(message: Told): number {
 const view = new View(at<HTMLCanvasElement>("canvas"), at("look"));
 view.onBusy = tellBusy;
 listenToKeys(at("canvas"), view);
-const overlay = new Overlay(document.querySelector<SVGSVGElement>("#overlay")!, () => ({
-  text: css("--text"),
-  line: css("--dim"),
-  ground: css("--stage"),
-}));
+const overlay = overlayOn("overlay");
 view.onFrame = (sight) => overlay.draw(sight);
 const inspector = new Inspector(at<HTMLCanvasElement>("canvas"), view, ask, askToSee);
 
 // Whether something else is about to be seen.
 function tellBusy() {
-  at("stage").setAttribute("aria-busy", `${view.busy || asked !== drawn}`);
+  at("stage").setAttribute("aria-busy", `${view.busy || asked !== drawn || beside.busy}`);
 }
+
+const beside = new Beside(
+  view,
+  () => ({ type: "open", host: location.host, secret: secretNow(), lists: false }),
+  tellBusy,
+);
 
 let chosen = "";
 let recorded = false;
@@ -103,7 +102,7 @@ const time = new Time(
   () => drawn,
   () => !recorded,
 );
-const [secret, mode] = location.hash.slice(1).split("&");
+const [, mode] = location.hash.slice(1).split("&");
 const demo = mode === "demo";
 const leader = new Leader(demo, time, () => {
   const next = list[list.findIndex(({ name }) => name === chosen) + 1];
@@ -111,6 +110,11 @@ const leader = new Leader(demo, time, () => {
 });
 const histograms = new Histograms(at("histograms"));
 const curves = new Curves(at("curves"), at("legend"), (revision) => time.show(revision));
+
+// What the page was opened with holds but once: another takes its place.
+function secretNow(): string {
+  return location.hash.slice(1).split("&")[0];
+}
 
 function note(text: string) {
   at("note").hidden = false;
@@ -141,6 +145,7 @@ function choose(name: string) {
   note(emptyOf(null));
   view.clear();
   drawList(at("list"), list, chosen, chooseByHand);
+  beside.offer(list, chosen);
   askToSee({ type: "watch", name });
 }
 
@@ -162,7 +167,7 @@ function meet(row: MeshRow) {
   const { parts, first, oblique } = choicesOf(row);
   look = first;
   stopTour();
-  view.stand(row.d);
+  view.standIn(row.d);
   at("look").hidden = at("right").hidden = false;
   at<HTMLInputElement>("level").value = "0.5";
   fill("part", parts, look.part);
@@ -181,6 +186,7 @@ function meet(row: MeshRow) {
   at("axes-box").hidden = row.d <= 3;
   setParts();
   askToSee({ type: "look", name: chosen, look });
+  beside.lookBy({ look, k: row.k, d: row.d });
   // From one side alone, what has more dimensions lies over itself.
   if (row.d > 3 && !matchMedia("(prefers-reduced-motion: reduce)").matches) startTour();
 }
@@ -223,6 +229,7 @@ function changeLook(change: Partial<Look>) {
   if (tour && (change.part !== undefined || change.axis !== undefined)) startTour();
   setParts();
   askToSee({ type: "look", name: chosen, look });
+  beside.lookBy({ look, k: mesh.k, d: mesh.d });
 }
 
 at<HTMLSelectElement>("part").onchange = (e) =>
@@ -254,8 +261,11 @@ at<HTMLInputElement>("tour").onchange = (e) => {
   if ((e.target as HTMLInputElement).checked) startTour();
   else stopTour();
 };
-at<HTMLInputElement>("wires").onchange = (e) =>
-  view.setWires((e.target as HTMLInputElement).checked);
+at<HTMLInputElement>("wires").onchange = (e) => {
+  const on = (e.target as HTMLInputElement).checked;
+  view.setWires(on);
+  beside.setWires(on);
+};
 at("fit").onclick = () => view.refit();
 at<HTMLSelectElement>("save").onchange = (e) => {
   const select = e.target as HTMLSelectElement;
@@ -351,6 +361,7 @@ const hear: { [T in FromWorker["type"]]: (m: Extract<FromWorker, { type: T }>) =
   list: ({ meshes }) => {
     list = meshes;
     drawList(at("list"), list, chosen, chooseByHand);
+    beside.offer(list, chosen);
     const first = meshes.at(leader.leads ? 0 : -1);
     if (!chosen && first) choose(first.name);
     if (!chosen) note("No mesh yet");
@@ -443,10 +454,10 @@ if (recording) {
   recorded = true;
   document.body.classList.add("recorded");
   ask({ type: "replay", recording: JSON.parse(recording) as Recording });
-} else if (!secret) {
+} else if (!secretNow()) {
   note("Open the address that `stellate view` printed, with all that follows #.");
 } else if (!globalThis.crypto?.subtle) {
   note("Open this page as http://127.0.0.1 or http://localhost.");
 } else {
-  ask({ type: "open", host: location.host, secret });
+  ask({ type: "open", host: location.host, secret: secretNow(), lists: true });
 }

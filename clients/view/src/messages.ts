@@ -92,7 +92,7 @@ export interface Verdict {
 export type ToWorker = Told & { asked?: number };
 
 export type Told =
-  | { type: "open"; host: string; secret: string }
+  | { type: "open"; host: string; secret: string; lists: boolean } // says what meshes there are
   | { type: "replay"; recording: Recording }
   | { type: "watch"; name: string }
   | { type: "revision"; revision: number | null } // null: the newest, as it comes

@@ -40,6 +40,12 @@ export function colourAt(value: number, out: Color): Color {
   return out.lerpColors(kMap[i], kMap[i + 1], place - i);
 }
 
+// Whence a mesh is seen, in its own size: for another to be seen from there, too.
+export interface Stance {
+  eye: Vector3; // from the middle of the picture
+  aside: Vector3; // where that is, from the middle of the mesh
+}
+
 // Whence the mesh is seen, for what is drawn over it.
 export interface Sight {
   width: number; // pixels, as all of these
@@ -99,6 +105,9 @@ export class View {
   private owed: Scene | null = null; // not drawn yet
   onDrawn: (scene: Scene) => void = () => {};
   onBusy: () => void = () => {}; // it is, or is no longer
+  onMoved: () => void = () => {}; // it was turned, shifted, or came nearer
+  private moved = false; // by another
+  follows = false; // another: how it is seen stays, whatever it grows to
   onFrame: (sight: Sight) => void = () => {};
 
   // `over`: what stands on the lower end of the canvas, which meshes are fitted above.
@@ -109,7 +118,10 @@ export class View {
     this.renderer = rendererOf(canvas);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.zoomToCursor = true;
-    this.controls.addEventListener("change", () => this.redraw());
+    this.controls.addEventListener("change", () => {
+      this.redraw();
+      if (!this.moved) this.onMoved();
+    });
     this.controls.addEventListener("start", () => {
       this.moving = true;
       this.flight = null;
@@ -151,6 +163,7 @@ export class View {
     });
     resized.observe(canvas);
     resized.observe(over);
+    this.all.visible = false;
     this.setWires(true);
     requestAnimationFrame((now) => this.tick(now));
   }
@@ -191,7 +204,7 @@ export class View {
   }
 
   // In R^d: a plane is looked at from above, whatever was looked at before.
-  stand(d: number) {
+  standIn(d: number) {
     if (this.flat === (d === 2)) return;
     this.flat = d === 2;
     this.controls.target.set(0, 0, 0);
@@ -201,7 +214,7 @@ export class View {
   // `plain`: of what has no colour of its own. `several`: of where walls meet, and about dots.
   // `curve`: its segments are the mesh, not edges of it.
   show(scene: Scene, plain: string, several: string, curve: boolean) {
-    this.all.visible = true;
+    this.all.visible = scene.vertices > 0;
     const { shape, rim } = scene;
     const solid = shape.kind === "triangles";
     const colours = coloursOf(shape, new Color(plain));
@@ -234,7 +247,9 @@ export class View {
     this.chosen.show(scene.chosen);
     this.pinnedEdges.show(scene.pinnedEdges);
     this.pinned.show(scene.pinned);
+    const stance = this.stance;
     this.ball = { centre: new Vector3(...scene.centre), radius: scene.radius };
+    if (this.follows) this.stand(stance);
     if (!this.fitted && scene.vertices > 0) this.fit();
     this.owed = scene;
     this.redraw();
@@ -278,6 +293,26 @@ export class View {
     this.fitted = true;
     this.camera.position.copy(this.controls.target).add(way);
     this.controls.update();
+    this.redraw();
+  }
+
+  get stance(): Stance {
+    const { centre, radius } = this.ball;
+    const { target } = this.controls;
+    return {
+      eye: this.camera.position.clone().sub(target).divideScalar(radius),
+      aside: target.clone().sub(centre).divideScalar(radius),
+    };
+  }
+  // Until it is fitted again, or turned.
+  stand({ eye, aside }: Stance) {
+    const { centre, radius } = this.ball;
+    this.moved = true;
+    this.fitted = true;
+    this.controls.target.copy(centre).addScaledVector(aside, radius);
+    this.camera.position.copy(this.controls.target).addScaledVector(eye, radius);
+    this.controls.update();
+    this.moved = false;
     this.redraw();
   }
 

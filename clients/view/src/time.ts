@@ -1,10 +1,9 @@
 // The slider over a mesh's revisions: which is shown, and growing it again.
 import { grouped } from "./panels";
+import { at } from "./page";
 
 const kReplaySeconds = 0.2; // a step
 const kMostSteps = 60;
-
-const at = <T extends HTMLElement>(id: string) => document.getElementById(id) as T;
 
 export class Time {
   shown = 0; // the revision on the screen; 0: none yet

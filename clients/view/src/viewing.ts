@@ -225,6 +225,11 @@ export class Viewing {
       },
       { stop: this.stop.signal, revision },
     );
+    // A recording has them but once: with the newest revision.
+    const past = this.past.find((row) => row.revision === store.revision);
+    if (!this.source.live && past && store.vertices === 0) {
+      store.addPoints(0, this.store!.points.subarray(0, past.vertices * store.d));
+    }
     if (end.code !== 0) this.send({ type: "loading", text: end.message });
     return end.code === 0 ? store : null;
   }

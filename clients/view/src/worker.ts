@@ -48,14 +48,14 @@ function view(name: string) {
 }
 
 const answers: { [T in Told["type"]]: (m: Extract<Told, { type: T }>) => unknown } = {
-  open: async ({ host, secret }) => {
+  open: async ({ host, secret, lists }) => {
     const gateway = await GatewaySource.open(host, secret);
     gateway.onGreeting = ({ server, mesh, secret: kept }) => {
       gateway.onGreeting = () => {};
       send({ type: "greeting", server, mesh, secret: kept });
     };
     source = gateway;
-    void list();
+    if (lists) void list();
   },
   replay: ({ recording }) => {
     source = new RecordedSource(recording);
