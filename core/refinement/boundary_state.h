@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "core/base/instantiate.h"
+#include "core/boundary/boundary_policy.h"
 #include "core/closures.h"
 #include "core/refinement/candidate_set.h"
 #include "core/walls.h"
@@ -23,22 +24,16 @@ class BoundaryState {
   // Corners nearer to each other than this, in epsilon, are one.
   static constexpr double kSameCorner = 1e-6;
 
-  // boundary_only  the last stage is that of the boundary, K - 1
-  explicit BoundaryState(int walls, Closures closures = {}, bool boundary_only = false)
-      : has_walls_(walls > 0),
-        closures_(std::move(closures)),
-        last_stage_(boundary_only ? K - 1 : K),
-        stage_(walls > 0 ? 0 : K) {}
+  explicit BoundaryState(const BoundaryPolicy& policy, Closures closures = {})
+      : policy_(policy), closures_(std::move(closures)), stage_(policy.first_stage()) {}
 
-  bool has_walls() const { return has_walls_; }
+  const BoundaryPolicy& policy() const { return policy_; }
 
-  // The dimension of the faces that are being meshed. Without walls there is one stage, K.
+  // The dimension of the faces that are being meshed.
   int stage() const { return stage_; }
-  // Whether the inside is never meshed.
-  bool leaves_inside() const { return last_stage_ < K; }
-  bool is_last_stage() const { return stage_ == last_stage_; }
+  bool is_last_stage() const { return stage_ == policy_.last_stage(); }
   // Goes to the next stage. Returns false after the last.
-  bool Advance() { return stage_ < last_stage_ && ++stage_ <= last_stage_; }
+  bool Advance() { return stage_ < policy_.last_stage() && ++stage_ <= policy_.last_stage(); }
   // Faces of dimension up to this could not be refined to the end. Rules skip them from now on, so
   // that the rest of M is meshed nevertheless. 0: none.
   int left() const { return left_; }
@@ -110,9 +105,9 @@ class BoundaryState {
   void NoteProtected() { most_while_split_.reset(); }
 
  private:
-  bool has_walls_;
+  BoundaryPolicy policy_;
   Closures closures_;
-  int last_stage_, stage_, left_ = 0;
+  int stage_, left_ = 0;
   std::optional<std::size_t> most_while_split_;
   std::vector<Seed> seeds_, discoveries_;
   std::vector<Split> splits_;

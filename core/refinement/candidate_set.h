@@ -57,6 +57,13 @@ struct AnsweredPoints {
   LabelTable labels;
   std::vector<WallSet> signs;
 
+  // The face that answer c was asked for on, and its conormals there, or null.
+  WallSet WallsOf(Eigen::Index c) const {
+    return walls.empty() ? 0 : walls[static_cast<std::size_t>(c)];
+  }
+  const double* ConormalsOf(Eigen::Index c) const {
+    return walls.empty() ? nullptr : conormals.col(c).data();
+  }
   WallSet SignsOf(Eigen::Index c) const {
     return signs.empty() ? 0 : signs[static_cast<std::size_t>(c)];
   }

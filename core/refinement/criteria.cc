@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/boundary/boundary_policy.h"
 #include "core/geometry/reach.h"
 
 namespace stellate::core {
@@ -48,7 +49,7 @@ ResolvedCriteria Resolve(const Specification& spec) {
   }
   r.radius_edge_bound = c.radius_edge_bound;
   r.shape.sliver_bound = c.sliver_bound.value_or(kDefaultSliverBound[spec.dimension]);
-  if (spec.dimension == 3 && spec.walls > 0 && r.shape.sliver_bound > 0) {
+  if (BoundaryPolicy(spec).BoundsDihedrals() && r.shape.sliver_bound > 0) {
     const bool is_solid = spec.ambient_dimension == 3;
     r.shape.sharpest_cosine = is_solid ? kCosineOf14Degrees : kCosineOf10Degrees;
     r.shape.sharp_radius = kSharpRadius;

@@ -51,10 +51,10 @@ Engine<K>::Engine(const Specification& spec, const ResolvedCriteria& criteria)
       stars_(spec.ambient_dimension, criteria.epsilon, {criteria.inradius, criteria.centre_rule},
              LabelTable(spec.labels, Closures(spec.closures))),
       sizes_(criteria),
-      boundary_(spec.walls, Closures(spec.closures), spec.boundary_only),
+      boundary_(BoundaryPolicy(spec), Closures(spec.closures)),
       protection_(criteria.shape.protection) {
   // Sizes are estimated from whole stars.
-  if (boundary_.has_walls() && !sizes_.is_estimated()) stars_.RestrictToBoundary();
+  if (boundary_.policy().MeshesFacesFirst() && !sizes_.is_estimated()) stars_.RestrictToBoundary();
 }
 
 template <int K>
@@ -226,7 +226,6 @@ std::optional<std::vector<Target<K>>> Engine<K>::Plan() {
   }
   if (targets.empty()) targets = GoodPointTargets();
   if (targets.empty() && protection_.is_asked() && AllRulesHold()) targets = ProtectionTargets();
-  if (!boundary_.has_walls()) return targets;
   const bool any = !targets.empty();
   FaceSplits<K>(parts()).Yield(&targets);
   if (any && targets.empty()) return Plan();  // all were refused, which is not done forever
@@ -274,10 +273,8 @@ Inserted Engine<K>::Insert(const CandidateSet<K>& candidates, const AnsweredPoin
 
 template <int K>
 void Engine<K>::Append(const AnsweredPoints& answers, Eigen::Index c) {
-  const bool on_faces = !answers.walls.empty();
   stars_.Add(answers.points.col(c).data(), answers.tangents.col(c).data(), Stars<K>::kNone,
-             on_faces ? answers.walls[static_cast<std::size_t>(c)] : WallSet{0},
-             on_faces ? answers.conormals.col(c).data() : nullptr, answers.SignsOf(c));
+             answers.WallsOf(c), answers.ConormalsOf(c), answers.SignsOf(c));
   if (answers.sizes.size() > 0) sizes_.AppendGiven(answers.sizes[c]);
 }
 

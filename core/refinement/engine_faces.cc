@@ -32,7 +32,7 @@ bool Engine<K>::LeaveStage() {
 template <int K>
 void Engine<K>::CompleteStars(std::vector<std::uint32_t>* added,
                               std::vector<std::uint32_t>* removed) {
-  if (boundary_.stage() == K || boundary_.leaves_inside() || stars_.size() == 0) return;
+  if (boundary_.stage() == K || boundary_.policy().LeavesInside() || stars_.size() == 0) return;
   const std::vector<std::uint32_t> before = stars_.Simplices();
   stars_.IncludeInterior();
   stars_.Commit();

@@ -78,6 +78,7 @@ std::optional<Target<K>> FaceSplits<K>::Under(std::uint32_t star,
 
 template <int K>
 void FaceSplits<K>::Yield(std::vector<Target<K>>* targets) {
+  if (engine_.stars.sample().boundary().empty()) return;
   int lowest = K;
   for (const Target<K>& t : *targets) lowest = std::min(lowest, t.violation.dimension());
   std::erase_if(*targets, [&](const Target<K>& t) {

@@ -150,7 +150,7 @@ std::optional<int> Inserter<K>::BeyondFrom(const Target<K>& t, Eigen::Index c) c
 template <int K>
 bool Inserter<K>::FitsFaces(Eigen::Index c) const {
   return !to_.stars.sample().InProtectingBall(answers_.points.col(c).data()) &&
-         !to_.stars.EncroachedBy(answers_.points.col(c).data(), WallsOf(c));
+         !to_.stars.EncroachedBy(answers_.points.col(c).data(), answers_.WallsOf(c));
 }
 
 template <int K>
@@ -170,11 +170,14 @@ int Inserter<K>::BestCandidate(std::size_t i) const {
       continue;
     const int index = static_cast<int>(c - first);
     if (to_.criteria.candidates == 1) return index;
-    stars.TryPoint(y, answers_.tangents.col(c).data(), t.star, &tentative, WallsOf(c),
-                   ConormalsOf(c), answers_.SignsOf(c));
-    const Site guest{
-        stars.size(),       y, answers_.tangents.col(c).data(), WallsOf(c), ConormalsOf(c),
-        answers_.SignsOf(c)};
+    stars.TryPoint(y, answers_.tangents.col(c).data(), t.star, &tentative, answers_.WallsOf(c),
+                   answers_.ConormalsOf(c), answers_.SignsOf(c));
+    const Site guest{stars.size(),
+                     y,
+                     answers_.tangents.col(c).data(),
+                     answers_.WallsOf(c),
+                     answers_.ConormalsOf(c),
+                     answers_.SignsOf(c)};
     // Of points that leave no simplex unprotected, one that resolves more is better.
     const int resolved = delta > 0 ? CountResolved<K>(stars, guest, tentative, delta) : 0;
     const int bad = CountBad<K>(stars, guest, tentative, to_.criteria.shape,
@@ -218,26 +221,26 @@ void Inserter<K>::InsertPlanned() {
     if (to_.is_full()) break;
     const Eigen::Index c = candidates_.drawn() + i;
     if (!answers_.found[static_cast<std::size_t>(c)]) continue;
-    if (to_.stars.sample().Codimension(WallsOf(c)) == K &&
+    if (to_.stars.sample().Codimension(answers_.WallsOf(c)) == K &&
         to_.boundary.KeepCrowd(answers_, c, BoundaryState<K>::kSameCorner * to_.criteria.epsilon))
       continue;
     if (const auto beyond = answers_.Beyond(c)) {
-      to_.boundary.Discover(answers_.points.col(c), WallsOf(c), *beyond);
+      to_.boundary.Discover(answers_.points.col(c), answers_.WallsOf(c), *beyond);
       continue;
     }
     if (!FitsFaces(c)) continue;
     if (const std::optional<int> next = answers_.NextWall(c); next && to_.boundary.stage() == 0)
-      to_.boundary.Discover(answers_.points.col(c), WallsOf(c), *next);
-    if (K - to_.stars.sample().Codimension(WallsOf(c)) >
+      to_.boundary.Discover(answers_.points.col(c), answers_.WallsOf(c), *next);
+    if (K - to_.stars.sample().Codimension(answers_.WallsOf(c)) >
         to_.boundary.stage()) {  // corners and their shells come first
-      to_.boundary.KeepSeed(answers_.points.col(c), WallsOf(c));
+      to_.boundary.KeepSeed(answers_.points.col(c), answers_.WallsOf(c));
       continue;
     }
     if (to_.stars.sample().AnyWithin(answers_.points.col(c).data(),
                                      kKeptSpacing * planned.spacing[i])) {
       ++done_.duplicates;
-      if (WallsOf(c) != 0 && !HasPointOn<K>(to_.stars, WallsOf(c)))
-        to_.boundary.KeepSeed(answers_.points.col(c), WallsOf(c));
+      if (answers_.WallsOf(c) != 0 && !HasPointOn<K>(to_.stars, answers_.WallsOf(c)))
+        to_.boundary.KeepSeed(answers_.points.col(c), answers_.WallsOf(c));
       continue;
     }
     Insert(c, planned.rules[static_cast<std::size_t>(i)], Stars<K>::kNone);
@@ -246,8 +249,8 @@ void Inserter<K>::InsertPlanned() {
 
 template <int K>
 typename Inserter<K>::Outcome Inserter<K>::Insert(Eigen::Index c, Rule rule, std::uint32_t near) {
-  to_.stars.Add(answers_.points.col(c).data(), answers_.tangents.col(c).data(), near, WallsOf(c),
-                ConormalsOf(c), answers_.SignsOf(c));
+  to_.stars.Add(answers_.points.col(c).data(), answers_.tangents.col(c).data(), near,
+                answers_.WallsOf(c), answers_.ConormalsOf(c), answers_.SignsOf(c));
   if (answers_.sizes.size() > 0) to_.sizes.AppendGiven(answers_.sizes[c]);
   done_.used[static_cast<std::size_t>(c)] = 1;
   done_.rules.push_back(rule);

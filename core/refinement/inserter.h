@@ -84,12 +84,6 @@ class Inserter {
   static typename Stars<K>::CellVertex VertexOf(const Target<K>& target) {
     return {target.star, target.violation.vertex, target.violation.sector};
   }
-  WallSet WallsOf(Eigen::Index candidate) const {
-    return answers_.walls.empty() ? 0 : answers_.walls[static_cast<std::size_t>(candidate)];
-  }
-  const double* ConormalsOf(Eigen::Index candidate) const {
-    return answers_.walls.empty() ? nullptr : answers_.conormals.col(candidate).data();
-  }
   Outcome Insert(Eigen::Index candidate, Rule rule, std::uint32_t near);
   Outcome NoteFailedAttempt(std::uint32_t star);
 

@@ -8,8 +8,8 @@
 
 #include "core/base/parallel.h"
 #include "core/base/vector_ops.h"
+#include "core/boundary/boundary_mesh.h"
 #include "core/geometry/reach_bound.h"
-#include "core/refinement/boundary_mesh.h"
 
 namespace stellate::core {
 namespace {

@@ -19,6 +19,7 @@ constexpr std::size_t kMaxOffsets = 256;  // more would add nothing
 template <int K>
 void BoundaryDetector::Look(const CandidateSet<K>& candidates, const Eigen::MatrixXd& asked,
                             const AnsweredPoints& answers) {
+  if (!may_tell_) return;
   const Eigen::Index d = answers.points.rows();
   Eigen::VectorXd step(d);
   for (std::size_t i = 0; i < candidates.targets.size(); ++i) {

@@ -3,7 +3,9 @@
 #include <string>
 #include <vector>
 
+#include "core/boundary/boundary_policy.h"
 #include "core/refinement/candidate_set.h"
+#include "core/refinement/criteria.h"
 
 namespace stellate::core {
 
@@ -12,8 +14,12 @@ namespace stellate::core {
 // none.
 class BoundaryDetector {
  public:
-  // Collects offsets from the closest points of candidates, with their tangents. `asked`: by
-  // candidate, d x n. REQUIRES: no alternations.
+  // `criteria`: its steps between flats and M, which have tangential offsets themselves.
+  BoundaryDetector(const BoundaryPolicy& policy, const ResolvedCriteria& criteria)
+      : may_tell_(policy.MayEndUndeclared() && criteria.flat_alternations == 1) {}
+
+  // Collects offsets from the closest points of candidates, with their tangents, if they may tell
+  // anything: not of declared walls, nor with alternations. `asked`: by candidate, d x n.
   template <int K>
   void Look(const CandidateSet<K>& candidates, const Eigen::MatrixXd& asked,
             const AnsweredPoints& answers);
@@ -24,6 +30,7 @@ class BoundaryDetector {
   std::string Describe(int d) const;
 
  private:
+  bool may_tell_;
   std::vector<double> offsets_;
 };
 

@@ -7,9 +7,9 @@
 #include "core/base/instantiate.h"
 #include "core/base/interruption.h"
 #include "core/base/parallel.h"
+#include "core/boundary/boundary_mesh.h"
+#include "core/boundary/faces.h"
 #include "core/complex/consistency.h"
-#include "core/refinement/boundary_mesh.h"
-#include "core/refinement/faces.h"
 
 namespace stellate::core {
 namespace {
@@ -65,7 +65,7 @@ StarFacts FactsOf(Engine<K>& engine) {
   facts.protection = engine.protection().delta();
   facts.centre_rule = engine.criteria().centre_rule;
   const bool agreed = engine.filled().is_handed_out();
-  const bool leaves_inside = engine.boundary().leaves_inside();
+  const bool leaves_inside = engine.boundary().policy().LeavesInside();
   const bool has_labels = !stars.sample().sectors().labels().empty();
   std::vector<double> parts(ChunkCount(stars.size()), 0);
   ParallelChunks(stars.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
@@ -122,7 +122,8 @@ void AddWhatIsKnown(const Stars<K>& stars, std::vector<FaceMesh>* faces) {
 }
 
 template <int K>
-BoundaryOfMesh BoundaryOf(const Engine<K>& engine) {
+std::optional<BoundaryOfMesh> BoundaryOf(const Engine<K>& engine) {
+  if (!engine.boundary().policy().TakesClearances()) return std::nullopt;
   const Stars<K>& stars = engine.stars();
   BoundaryOfMesh boundary;
   boundary.walls.resize(stars.size());
@@ -150,7 +151,7 @@ BoundaryOfMesh BoundaryOf(const Engine<K>& engine) {
     }
   }
   boundary.faces = FacesOf<K>(engine.stars());
-  if (engine.boundary().leaves_inside()) AddWhatIsKnown<K>(stars, &boundary.faces);
+  if (engine.boundary().policy().LeavesInside()) AddWhatIsKnown<K>(stars, &boundary.faces);
   for (std::uint32_t p = 0; stars.sample().has_protecting_balls() && p < stars.size(); ++p)
     boundary.balls.push_back(stars.sample().ProtectingRadius2(p));
   return boundary;
@@ -158,7 +159,7 @@ BoundaryOfMesh BoundaryOf(const Engine<K>& engine) {
 
 #define STELLATE_EACH(K)                     \
   template StarFacts FactsOf<K>(Engine<K>&); \
-  template BoundaryOfMesh BoundaryOf<K>(const Engine<K>&);
+  template std::optional<BoundaryOfMesh> BoundaryOf<K>(const Engine<K>&);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH
 

@@ -28,8 +28,9 @@ struct BoundaryOfMesh {
   std::vector<FaceMesh> faces;
   std::vector<double> balls;  // squared radii of protecting balls, by vertex; empty: none
 };
+// Nothing of a manifold without boundary.
 template <int K>
-BoundaryOfMesh BoundaryOf(const Engine<K>& engine);
+std::optional<BoundaryOfMesh> BoundaryOf(const Engine<K>& engine);
 
 // Queries what the certificate needs, and owns it.
 class Certification final : public QuerySource {

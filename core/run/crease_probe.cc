@@ -75,14 +75,13 @@ double SineBetween(const Eigen::MatrixXd& one, const Eigen::MatrixXd& other) {
   return FarthestOff(one, other).second;
 }
 
-CreaseProbe::CreaseProbe(int k, int d, double size, bool gives_tangents, bool has_walls,
-                         std::uint64_t seed)
-    : k_(k),
-      d_(d),
-      size_(size),
-      gives_tangents_(gives_tangents),
-      has_walls_(has_walls),
-      finder_(k, d, 1, seed) {}
+CreaseProbe::CreaseProbe(const Specification& spec)
+    : k_(spec.dimension),
+      d_(spec.ambient_dimension),
+      size_(spec.epsilon),
+      gives_tangents_(spec.oracle.tangent_basis),
+      policy_(spec),
+      finder_(k_, d_, 1, spec.random_seed) {}
 
 void CreaseProbe::Start(std::vector<Way> ways) {
   is_difference_ = looks_beyond_ = false;
@@ -139,7 +138,7 @@ std::vector<QueryBlock> CreaseProbe::Questions() {
       block.points.middleCols(kAsked * static_cast<Eigen::Index>(w), kAsked) =
           PointsAbout(walks_[w].way);
   }
-  block.want.clearances = has_walls_;
+  policy_.AddWishes(&block);
   return {std::move(block)};
 }
 

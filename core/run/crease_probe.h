@@ -5,6 +5,7 @@
 #include <optional>
 #include <vector>
 
+#include "core/boundary/boundary_policy.h"
 #include "core/run/query_source.h"
 #include "core/run/tangent_finder.h"
 
@@ -41,9 +42,7 @@ struct Crease {
 //   if (probe.crease()) verdict += DescribeCrease(*probe.crease());
 class CreaseProbe final : public QuerySource {
  public:
-  // k, d: dimensions of M and of space. size: of the mesh, length. gives_tangents, has_walls: of
-  // the oracle.
-  CreaseProbe(int k, int d, double size, bool gives_tangents, bool has_walls, std::uint64_t seed);
+  explicit CreaseProbe(const Specification& spec);
 
   // Starts again, from these ways, and forgets what it found.
   void Start(std::vector<Way> ways);
@@ -82,7 +81,8 @@ class CreaseProbe final : public QuerySource {
 
   int k_, d_;
   double size_;
-  bool gives_tangents_, has_walls_;
+  bool gives_tangents_;
+  BoundaryPolicy policy_;
   TangentFinder finder_;
   bool is_difference_ = false;  // asks for tangents of what it has found
   bool looks_beyond_ = false;   // asks what is about the first walk's end

@@ -16,10 +16,7 @@ constexpr double kTellingWay = 0.5, kTellingSine2 = 0.25;
 
 template <int K>
 CreaseSearch<K>::CreaseSearch(const Specification& spec)
-    : epsilon_(spec.epsilon),
-      is_domain_(K == spec.ambient_dimension),
-      probe_(K, spec.ambient_dimension, spec.epsilon, spec.oracle.tangent_basis, spec.walls > 0,
-             spec.random_seed) {}
+    : epsilon_(spec.epsilon), is_domain_(K == spec.ambient_dimension), probe_(spec) {}
 
 template <int K>
 void CreaseSearch<K>::Watch(const Engine<K>& engine) {

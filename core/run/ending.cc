@@ -53,7 +53,7 @@ template <int K>
 void DescribeUnfinished(const Engine<K>& engine, double epsilon, bool is_smooth,
                         Certificate* certificate) {
   const Stars<K>& stars = engine.stars();
-  if (engine.boundary().leaves_inside()) {  // no star is closed
+  if (engine.boundary().policy().LeavesInside()) {  // no star is closed
     certificate->inconsistent_simplices = engine.violations().inconsistent();
     return;
   }

@@ -9,7 +9,7 @@ namespace stellate::core {
 
 template <int K>
 MeshingRun<K>::MeshingRun(Specification spec)
-    : spec_(std::move(spec)), scheduler_(spec_, interruption_) {
+    : spec_(std::move(spec)), scheduler_(spec_, interruption_), mesh_(scheduler_.engine()) {
   OpenRound();
 }
 
@@ -94,7 +94,7 @@ Expected<MeshDelta> MeshingRun<K>::Absorb(const Answers& answers) {
       parts_->Take(answers);
     }
     if (progress_.round >= spec_.limits.max_rounds) scheduler_.Finish(Termination::kRoundBudget);
-    if (spec_.boundary_only && complete) boundary_.Update(scheduler_.engine().stars(), &delta);
+    if (complete) mesh_.Update(&delta);
     Update();
   };
   if (!WithThreads(spec_.threads, interruption_, advance)) {
@@ -104,23 +104,8 @@ Expected<MeshDelta> MeshingRun<K>::Absorb(const Answers& answers) {
     report_ = report_before;
     return Refuse(StatusCode::kCancelled, "the computation was interrupted");
   }
-  AddChange(&delta);
-  const Stars<K>& stars = scheduler_.engine().stars();
-  delta.points = Points().rightCols(stars.size() - static_cast<Eigen::Index>(delta.first_vertex));
-  if (spec_.walls > 0)
-    for (auto v = static_cast<std::uint32_t>(delta.first_vertex); v < stars.size(); ++v)
-      delta.walls.push_back(stars.sample().walls(v));
+  mesh_.Add(scheduler_.TakeChange(), &delta);
   return delta;
-}
-
-// Moves the round's simplices into its delta.
-template <int K>
-void MeshingRun<K>::AddChange(MeshDelta* delta) {
-  auto change = scheduler_.TakeChange();
-  if (spec_.boundary_only) return;
-  delta->added = std::move(change.added);
-  delta->removed = std::move(change.removed);
-  delta->labels = scheduler_.engine().stars().LabelsOf(delta->added);
 }
 
 template <int K>
@@ -139,7 +124,7 @@ void MeshingRun<K>::Update() {
   const std::optional<Outcome>& outcome = scheduler_.outcome();
   if (!outcome) {
     scheduler_.Measure(&progress_);
-    if (spec_.boundary_only) progress_.simplices = boundary_.size();
+    progress_.simplices = mesh_.size();
     return;
   }
   parts_.reset();
@@ -152,7 +137,7 @@ void MeshingRun<K>::Update() {
     const Engine<K>& engine = scheduler_.engine();
     progress_.is_foreseeable = false;
     progress_.vertices = engine.stars().size();
-    progress_.simplices = spec_.boundary_only ? boundary_.size() : engine.simplex_count();
+    progress_.simplices = mesh_.size();
     progress_.bad_sliver = engine.violations().slivers();
     progress_.bad_inconsistent = engine.violations().inconsistent();
     progress_.bad_protection = engine.protection().weak();
@@ -160,12 +145,6 @@ void MeshingRun<K>::Update() {
   }
   report_.counts.vertices = progress_.vertices;
   report_.counts.simplices = progress_.simplices;
-}
-
-template <int K>
-Eigen::Map<const Eigen::MatrixXd> MeshingRun<K>::Points() const {
-  const Stars<K>& stars = scheduler_.engine().stars();
-  return {stars.sample().points().data(), stars.sample().d(), stars.size()};
 }
 
 STELLATE_INSTANTIATE_CLASS(MeshingRun)

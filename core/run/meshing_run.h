@@ -9,8 +9,8 @@
 #include "core/base/instantiate.h"
 #include "core/base/interruption.h"
 #include "core/mesher.h"
-#include "core/refinement/boundary_mesh.h"
 #include "core/run/batch_parts.h"
+#include "core/run/output_mesh.h"
 #include "core/run/scheduler.h"
 
 namespace stellate::core {
@@ -31,17 +31,12 @@ class MeshingRun final : public Mesher {
   const Specification& specification() const override { return spec_; }
   const Progress& progress() const override { return progress_; }
   const Report& report() const override { return report_; }
-  Eigen::Map<const Eigen::MatrixXd> Points() const override;
+  Eigen::Map<const Eigen::MatrixXd> Points() const override { return mesh_.Points(); }
   Eigen::MatrixXd Tangents() const override {
     return scheduler_.engine().stars().sample().TangentMatrix();
   }
-  std::vector<std::uint32_t> Simplices() const override {
-    return spec_.boundary_only ? boundary_.Simplices() : scheduler_.engine().Simplices();
-  }
-  std::vector<std::int8_t> Labels() const override {
-    return spec_.boundary_only ? boundary_.Labels()
-                               : scheduler_.engine().stars().LabelsOf(Simplices());
-  }
+  std::vector<std::uint32_t> Simplices() const override { return mesh_.Simplices(); }
+  std::vector<std::int8_t> Labels() const override { return mesh_.Labels(); }
 
  private:
   const std::shared_ptr<QueryBatch>& OpenBatch();
@@ -50,14 +45,13 @@ class MeshingRun final : public Mesher {
   void Count(const QueryBatch& asked);
   void Finish(Termination termination, Status failure);
   void Update();
-  void AddChange(MeshDelta* delta);
 
   const Specification spec_;
   Interruption interruption_;
   Scheduler<K> scheduler_;
+  OutputMesh<K> mesh_;
   std::shared_ptr<QueryBatch> batch_;  // of the open round; null: there is none
   std::optional<BatchParts> parts_;    // of batch_, if that is too large for one batch
-  BoundaryMesh<K> boundary_;           // what is handed out of the boundary alone
   Progress progress_;
   Report report_;
 };

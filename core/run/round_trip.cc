@@ -21,13 +21,14 @@ constexpr double kFarPlanned = 3;
 
 template <int K>
 RoundTrip<K>::RoundTrip(const Engine<K>& engine, const OracleCapabilities& oracle,
-                        TangentFinder& finder, CandidateSet<K> candidates, int walls)
+                        TangentFinder& finder, CandidateSet<K> candidates)
     : engine_(engine),
+      policy_(engine.boundary().policy()),
       oracle_(oracle),
-      walls_(walls),
       finder_(finder),
       candidates_(std::move(candidates)) {
-  const bool alternates = !oracle_.intersect_flat && candidates_.planned.size() == 0 && walls_ == 0;
+  const bool alternates =
+      !oracle_.intersect_flat && candidates_.planned.size() == 0 && policy_.MayAlternate();
   if (alternates) alternations_left_ = engine_.criteria().flat_alternations - 1;
   FindKnown();
   PlanPoints();
@@ -96,7 +97,7 @@ void RoundTrip<K>::FindKnown() {
   constexpr double kCovering = 1.25;  // of epsilon: R1 bounds it in tangent spaces, walls bend
   const Stars<K>& stars = engine_.stars();
   const std::vector<Target<K>>& targets = candidates_.targets;
-  if (walls_ == 0 || stars.sample().d() != K || engine_.criteria().sizes_given) return;
+  if (!policy_.FillsSpace() || engine_.criteria().sizes_given) return;
   known_.resize(static_cast<std::size_t>(candidates_.drawn()));
   ParallelFor(targets.size(), [&](std::size_t i) {
     if (targets[i].violation.walls != 0) return;
@@ -120,7 +121,7 @@ QueryBlock RoundTrip<K>::NewBlock(QueryKind kind, WallSet face) const {
   QueryBlock block;
   block.kind = kind;
   block.face = face;
-  block.want.clearances = walls_ > 0;
+  policy_.AddWishes(&block);
   block.want.tangents = oracle_.tangent_basis;
   block.want.sizes = engine_.criteria().sizes_given;
   return block;
@@ -266,7 +267,7 @@ void RoundTrip<K>::Sort(const std::vector<AnswerBlock>& answers) {
     if (block.tangents.size() > 0)
       ToByVector(block.tangents.col(column).data(), d, K, answers_.tangents.col(c).data());
   }
-  if (walls_ > 0) SortFaces(answers);
+  if (policy_.TakesClearances()) SortFaces(answers);
 }
 
 template <int K>
@@ -292,7 +293,8 @@ void RoundTrip<K>::SortFaces(const std::vector<AnswerBlock>& answers) {
   answers_.walls.assign(static_cast<std::size_t>(count), 0);
   answers_.labels = engine_.stars().sample().sectors().labels();
   if (!answers_.labels.empty()) answers_.signs.assign(static_cast<std::size_t>(count), 0);
-  answers_.clearances.resize(walls_, count);
+  const int walls = policy_.walls();
+  answers_.clearances.resize(walls, count);
   int most = K;  // walls of a face
   for (const WallSet face : asked_faces_) most = std::max(most, CountWalls(face));
   answers_.conormals.resize(Eigen::Index{K} * most, count);
@@ -311,7 +313,7 @@ void RoundTrip<K>::SortFaces(const std::vector<AnswerBlock>& answers) {
     if (!answers_.found[i]) continue;
     answers_.clearances.col(c) = block.clearances.col(column);
     if (!answers_.labels.empty())
-      answers_.signs[i] = SignsOf(answers_.clearances.col(c).data(), walls_);
+      answers_.signs[i] = SignsOf(answers_.clearances.col(c).data(), walls);
     for (int w = 0; w < CountWalls(face); ++w) {
       const double* conormal = block.conormals.col(column).data() + w * d;
       double* const own = answers_.conormals.col(c).data() + w * K;

@@ -20,7 +20,7 @@ class RoundTrip final : public QuerySource {
  public:
   // The engine and the finder must outlive this; the engine must not change meanwhile.
   RoundTrip(const Engine<K>& engine, const OracleCapabilities& oracle, TangentFinder& finder,
-            CandidateSet<K> candidates, int walls = 0);
+            CandidateSet<K> candidates);
 
   std::vector<QueryBlock> Questions() override;
   void Absorb(const std::vector<AnswerBlock>& answers) override;
@@ -52,8 +52,8 @@ class RoundTrip final : public QuerySource {
   void TakeTangents();
 
   const Engine<K>& engine_;
+  const BoundaryPolicy policy_;
   const OracleCapabilities oracle_;
-  const int walls_;
   TangentFinder& finder_;
   CandidateSet<K> candidates_;
   Eigen::MatrixXd asked_, offsets_;  // by candidate, d x n; offsets from the candidates, or empty

@@ -71,7 +71,7 @@ template <int K>
 std::unique_ptr<Sampler<K>> SamplerFor(Engine<K>& engine, const Specification& spec,
                                        const AnsweredPoints& seeds) {
   const ResolvedCriteria& criteria = engine.criteria();
-  if (spec.walls > 0) return SamplerBetweenWalls<K>(engine, spec);
+  if (engine.boundary().policy().MeshesFacesFirst()) return SamplerBetweenWalls<K>(engine, spec);
   if ((criteria.graded() && (!criteria.sizes_given || criteria.speculative)) ||
       !AreSparse<K>(engine, seeds, spec))
     return nullptr;

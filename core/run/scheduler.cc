@@ -37,11 +37,11 @@ Scheduler<K>::Scheduler(const Specification& spec, const Interruption& interrupt
       repeat_check_(spec_.epsilon),
       wall_check_(K, spec_.ambient_dimension, spec_.epsilon),
       spare_points_(spec_.ambient_dimension),
-      watches_{{spec_.bounding_box, engine_.criteria().epsilon}, StallWatch(K), {}, {}} {
-  if (spec_.walls > 0)
-    AskForFaces(SeedsOf(spec_));
-  else
-    AskFor(SeedsOf(spec_), Purpose::kSeeds);
+      watches_{{spec_.bounding_box, engine_.criteria().epsilon},
+               StallWatch(K),
+               {engine_.boundary().policy(), engine_.criteria()},
+               {}} {
+  AskForSeeds(SeedsOf(spec_));
 }
 
 template <int K>
@@ -89,8 +89,8 @@ void Scheduler<K>::Measure(Progress* progress) {
 template <int K>
 void Scheduler<K>::Ask(CandidateSet<K> candidates, Purpose purpose, const Engine<K>& asking) {
   certification_.reset();
-  trip_ = std::make_unique<RoundTrip<K>>(asking, spec_.oracle, tangent_finder_,
-                                         std::move(candidates), spec_.walls);
+  trip_ =
+      std::make_unique<RoundTrip<K>>(asking, spec_.oracle, tangent_finder_, std::move(candidates));
   purpose_ = purpose;
 }
 
@@ -150,8 +150,7 @@ void Scheduler<K>::InsertCandidates() {
     watches_.stall.NoteFrontMoved();
     creases_.NoteFrontMoved();
   }
-  if (engine_.criteria().flat_alternations == 1 && spec_.walls == 0)
-    watches_.boundary.Look(trip_->candidates(), trip_->asked(), trip_->answers());
+  watches_.boundary.Look(trip_->candidates(), trip_->asked(), trip_->answers());
   noted_.speculation_failed = inserted.rules.empty();
   spare_points_.Keep(trip_->answers(), inserted.used);
 }
@@ -211,7 +210,9 @@ void Scheduler<K>::Plan() {
 
 template <int K>
 void Scheduler<K>::Certify() {
-  if (!spec_.boundary_only && AskForSpares(spare_points_.Uncovered(engine_.stars()))) return;
+  if (!engine_.boundary().policy().LeavesInside() &&
+      AskForSpares(spare_points_.Uncovered(engine_.stars())))
+    return;
   const Stars<K>& stars = engine_.stars();
   if (stars.size() == 0 && !noted_.inside.empty())  // the discoveries led nowhere
     return Fail({StatusCode::kNoSeeds, noted_.inside});
@@ -230,9 +231,8 @@ void Scheduler<K>::Certify() {
   creases_.Stop();
   KnownOfManifold known = spare_points_.Take();
   known.tangential_offsets = watches_.boundary.offsets();
-  certification_ = std::make_unique<Certification>(
-      spec_, mesh, engine_.Simplices(), facts, std::move(known),
-      spec_.walls > 0 ? std::optional(BoundaryOf<K>(engine_)) : std::nullopt);
+  certification_ = std::make_unique<Certification>(spec_, mesh, engine_.Simplices(), facts,
+                                                   std::move(known), BoundaryOf<K>(engine_));
 }
 
 template <int K>

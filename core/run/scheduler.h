@@ -85,7 +85,7 @@ class Scheduler final : public QuerySource {
   void AfterTrip();
   void TakeTrip();
   void InsertSeeds();
-  void AskForFaces(const Eigen::MatrixXd& seeds);
+  void AskForSeeds(const Eigen::MatrixXd& seeds);
   void KeepFaceSeeds();
   void JudgeWalls();
   bool PlanFaces(std::optional<std::vector<Target<K>>>* targets);

@@ -77,14 +77,14 @@ void Scheduler<K>::DescribeEnding() {
     // A front that never closes may be where the manifold ends.
     const bool spent =
         termination == Termination::kVertexBudget || termination == Termination::kRoundBudget;
-    if (spec_.walls == 0 && !watches_.box.has_left() && !creases_.crease() &&
+    if (engine_.boundary().policy().MayEndUndeclared() && !watches_.box.has_left() &&
+        !creases_.crease() &&
         (termination == Termination::kNoProgress ||
          (spent && !watches_.boundary.offsets().empty())))
       certificate.verdict += Message(". ", kDeclareWalls);
   }
   if (interruption_.raised()) return;  // the mesh was never reported
   watches_.box.Warn(&certificate);
-  if (spec_.walls == 0) return;
   if (termination == Termination::kNoProgress)
     ExplainInactiveWall<K>(engine_, spec_.walls, &certificate);
   // The one that explains the most leads in the end.

@@ -23,15 +23,13 @@ constexpr double kKnownWithin = 0.1;
 
 // Queries the seeds' closest points on M, and on each wall.
 template <int K>
-void Scheduler<K>::AskForFaces(const Eigen::MatrixXd& seeds) {
+void Scheduler<K>::AskForSeeds(const Eigen::MatrixXd& seeds) {
+  const BoundaryPolicy& policy = engine_.boundary().policy();
   CandidateSet<K> candidates;
   PlannedPoints& planned = candidates.planned;
-  planned.points = seeds.replicate(1, spec_.walls + 1);
-  planned.walls.assign(static_cast<std::size_t>(seeds.cols()), 0);
-  for (int wall = 0; wall < spec_.walls; ++wall)
-    planned.walls.insert(planned.walls.end(), static_cast<std::size_t>(seeds.cols()),
-                         SetOfWall(wall));
-  Ask(std::move(candidates), Purpose::kFaceSeeds);
+  planned.points = seeds.replicate(1, policy.QueriesOfSeed());
+  planned.walls = policy.FacesOfSeeds(static_cast<std::size_t>(seeds.cols()));
+  Ask(std::move(candidates), policy.MeshesFacesFirst() ? Purpose::kFaceSeeds : Purpose::kSeeds);
 }
 
 template <int K>
@@ -167,7 +165,7 @@ void Scheduler<K>::LeaveFaces() {
 }
 
 #define STELLATE_EACH(K)                                                 \
-  template void Scheduler<K>::AskForFaces(const Eigen::MatrixXd&);       \
+  template void Scheduler<K>::AskForSeeds(const Eigen::MatrixXd&);       \
   template void Scheduler<K>::KeepFaceSeeds();                           \
   template void Scheduler<K>::JudgeWalls();                              \
   template bool Scheduler<K>::AskForSparesOnWalls(const PointsOnWalls&); \

@@ -38,7 +38,7 @@ RingSampler<K>::RingSampler(Engine<K>& engine, const Specification& spec, double
               !spec.oracle.tangent_basis),
       scouting_(std::make_unique<Growth<K>>(engine.stars().sample().d(), apart_ * growth_.spacing(),
                                             !spec.oracle.tangent_basis)) {
-  if (spec.walls > 0) clearance_.emplace(engine, growth_.spacing());
+  if (engine.boundary().policy().MeshesFacesFirst()) clearance_.emplace(engine, growth_.spacing());
 }
 
 template <int K>

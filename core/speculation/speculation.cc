@@ -41,6 +41,7 @@ AnsweredPoints AnswersOf(Surrogate<K>& surrogate, const Stars<K>& stars,
 // The surrogate has no walls: true points decide near them.
 template <int K>
 void LeaveWallsAlone(const Stars<K>& stars, double epsilon, std::vector<Target<K>>* targets) {
+  if (stars.sample().boundary().empty()) return;
   std::vector<double> aim(static_cast<std::size_t>(stars.sample().d()));
   std::erase_if(*targets, [&, step = std::size_t{0}](const Target<K>& t) mutable {
     CheckInterruption(step++);
@@ -70,8 +71,7 @@ std::vector<Rule> Drive(Engine<K>* speculation, const Engine<K>& original, std::
     if (speculation->is_full() || speculation->stars().size() > most) break;
     if (by == SpeculativeRules::kSizes && speculation->violations().size_and_shape().empty()) break;
     auto targets = speculation->Plan();
-    if (targets && speculation->boundary().has_walls())
-      LeaveWallsAlone<K>(speculation->stars(), criteria.epsilon, &*targets);
+    if (targets) LeaveWallsAlone<K>(speculation->stars(), criteria.epsilon, &*targets);
     if (!targets || targets->empty()) break;
     if (by == SpeculativeRules::kSizes && targets->front().violation.rule >= Rule::kShape) break;
     const CandidateSet<K> candidates = speculation->Draw(speculation->Select(*targets), round);

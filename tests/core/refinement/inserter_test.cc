@@ -50,7 +50,7 @@ class InserterTest : public ::testing::Test {
   Stars<2> stars_;
   SizeField<2> sizes_;
   ViolationIndex<2> book_;
-  BoundaryState<2> faces_{0};
+  BoundaryState<2> faces_{BoundaryPolicy::None(2)};
   CandidateSet<2> candidates_;
   AnsweredPoints answers_;
 };

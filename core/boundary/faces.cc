@@ -1,4 +1,4 @@
-#include "core/refinement/faces.h"
+#include "core/boundary/faces.h"
 
 #include <algorithm>
 #include <array>

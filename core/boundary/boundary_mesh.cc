@@ -1,4 +1,4 @@
-#include "core/refinement/boundary_mesh.h"
+#include "core/boundary/boundary_mesh.h"
 
 #include <Eigen/LU>
 #include <algorithm>
