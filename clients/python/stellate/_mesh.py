@@ -249,7 +249,8 @@ class Mesh:
         """Of a solid of space, or of what a closed surface bounds: volume, area, the integral of the mean
         curvature, Euler characteristic; of a region of several materials region(label).minkowski().
 
-        The first three to O(epsilon^2); the integral to O(epsilon) where edges are curved.
+        The first three to O(epsilon^2); the integral to O(epsilon) where edges are curved. Components of a
+        surface count each as what it bounds by itself, as in `enclosed_volume`.
 
         Raises: InvalidArgument for others, and where the surface touches itself.
         """
