@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <limits>
+#include <numeric>
 
 #include "core/base/interruption.h"
 #include "core/base/message.h"
@@ -63,7 +64,7 @@ MeshHistory::MeshHistory(int dimension, int ambient_dimension, int labels)
       points_(d_),
       smoothed_(d_),
       rows_(row_size_),
-      lives_(1),
+      died_(1),
       labels_(label_count_),
       deaths_(1),
       marks_(1),
@@ -94,6 +95,7 @@ Status MeshHistory::Append(const core::MeshDelta& delta, const PointPlaces& plac
     return OutOfStep(core::Message("a change leads to revision ", delta.revision, " but ", revision,
                                    " is the next"));
   }
+  if (revision >= kNone) return OutOfStep("the mesh has had more revisions than can be numbered");
   const auto new_vertices = static_cast<std::size_t>(delta.points.cols());
   if (new_vertices > 0 && delta.first_vertex != last.vertices) {
     return OutOfStep(core::Message("new vertices start at ", delta.first_vertex, " but ",
@@ -130,16 +132,17 @@ Status MeshHistory::Append(const core::MeshDelta& delta, const PointPlaces& plac
                                    places.codes.size(), " points and the positions of ", smoothed,
                                    ", and has ", vertices));
   }
-  const std::vector<Life> births(new_simplices, Life{revision, 0});
+  const std::vector<std::uint32_t> alive(new_simplices, 0);
   {
     const std::lock_guard lock(mutex_);
-    for (const std::uint32_t simplex : dying) lives_[simplex]->died = revision;
+    for (const std::uint32_t simplex : dying)
+      *died_[simplex] = static_cast<std::uint32_t>(revision);
     deaths_.Append(dying.data(), dying.size());
     points_.Append(delta.points.data(), new_vertices);
     for (std::size_t v = 0; v < delta.walls.size(); ++v)
       if (delta.walls[v] != 0) boundary_.push_back({last.vertices + v, delta.walls[v]});
     rows_.Append(delta.added.data(), new_simplices);
-    lives_.Append(births.data(), new_simplices);
+    died_.Append(alive.data(), new_simplices);
     labels_.Append(delta.labels.data(), delta.labels.size() / label_count_);
     if (!places.codes.empty()) places_ = places.codes;
     smoothed_.Append(places.smoothed.data(), smoothed);
@@ -156,17 +159,25 @@ Status MeshHistory::Append(const core::MeshDelta& delta, const PointPlaces& plac
 
 // The simplices of the newest revision, in lexicographic order of their rows.
 std::vector<std::uint32_t> MeshHistory::SortLiving() const {
-  std::vector<std::uint32_t> living;
-  living.reserve(marks_.back().simplices - marks_.back().deaths);
-  for (std::size_t v = 0; v < first_of_.size(); ++v) {
-    core::CheckInterruption(v);
-    const auto first = static_cast<std::ptrdiff_t>(living.size());
-    for (std::uint32_t s = first_of_[v]; s != kNone; s = *next_[s]) living.push_back(s);
-    std::sort(living.begin() + first, living.end(), [this](std::uint32_t a, std::uint32_t b) {
-      return std::lexicographical_compare(rows_[a], rows_[a] + row_size_, rows_[b],
-                                          rows_[b] + row_size_);
-    });
+  std::vector<std::uint32_t> end(marks_.back().vertices + 1, 0);  // of those with a lowest vertex
+  for (std::size_t s = 0; s < rows_.size(); ++s) {
+    core::CheckInterruption(s);
+    if (*died_[s] == 0) ++end[*rows_[s] + 1];
   }
+  std::partial_sum(end.begin(), end.end(), end.begin());
+  std::vector<std::uint32_t> living(end.back());
+  for (std::size_t s = 0; s < rows_.size(); ++s) {
+    core::CheckInterruption(s);
+    if (*died_[s] == 0) living[end[*rows_[s]]++] = static_cast<std::uint32_t>(s);
+  }
+  core::ParallelFor(marks_.back().vertices, [&](std::size_t v) {
+    const auto first = static_cast<std::ptrdiff_t>(v == 0 ? 0 : end[v - 1]);
+    std::sort(living.begin() + first, living.begin() + end[v],
+              [this](std::uint32_t a, std::uint32_t b) {
+                return std::lexicographical_compare(rows_[a], rows_[a] + row_size_, rows_[b],
+                                                    rows_[b] + row_size_);
+              });
+  });
   return living;
 }
 
@@ -188,18 +199,15 @@ core::Orientation MeshHistory::OrientationOf(const std::vector<std::uint32_t>& l
 }
 
 void MeshHistory::Orient() {
-  const std::vector<std::uint32_t> living = SortLiving();
-  core::Orientation orientation = OrientationOf(living);
-  std::vector<std::uint8_t> by_row;
-  if (orientation.orientable) by_row.assign(BytesOfBits(rows_.size()), 0);
-  for (std::size_t i = 0; i < living.size() && orientation.orientable; ++i) {
-    core::CheckInterruption(i);
-    if (IsSet(orientation.turned, i)) Set(&by_row, living[i]);
-  }
+  std::vector<std::uint32_t> sorted = SortLiving();
+  core::Orientation orientation = OrientationOf(sorted);
   const std::lock_guard lock(mutex_);
   complete_ = true;
   orientation_ = std::move(orientation);
-  turned_by_row_ = std::move(by_row);
+  sorted_ = std::move(sorted);
+  first_of_ = {};
+  next_ = GrowingRows<std::uint32_t>(1);
+  appenders_bytes_ = 0;
 }
 
 std::optional<core::Orientation> MeshHistory::orientation() const {
@@ -237,10 +245,8 @@ bool MeshHistory::ReadWalls(const Source& read) {
 bool MeshHistory::WriteOrientation(const Sink& write) const {
   const std::uint8_t known = !orientation_ ? 0 : orientation_->orientable ? 2 : 1;
   if (!write(&known, sizeof(known))) return false;
-  if (known < 2 || turned_by_row_.empty()) return true;
-  const std::vector<std::uint8_t>& turned = orientation_->turned;
-  return write(turned_by_row_.data(), turned_by_row_.size()) &&
-         (turned.empty() || write(turned.data(), turned.size()));
+  if (known < 2 || orientation_->turned.empty()) return true;
+  return write(orientation_->turned.data(), orientation_->turned.size());
 }
 
 bool MeshHistory::ReadOrientation(const Source& read) {
@@ -252,11 +258,9 @@ bool MeshHistory::ReadOrientation(const Source& read) {
   const Mark& end = marks_.back();
   orientation_->orientable = true;
   // No larger than the rows, which have been read.
-  turned_by_row_.resize(BytesOfBits(end.simplices));
-  orientation_->turned.resize(BytesOfBits(end.simplices - end.deaths));
-  return (turned_by_row_.empty() || read(turned_by_row_.data(), turned_by_row_.size())) &&
-         (orientation_->turned.empty() ||
-          read(orientation_->turned.data(), orientation_->turned.size()));
+  std::vector<std::uint8_t>& turned = orientation_->turned;
+  turned.resize(BytesOfBits(end.simplices - std::min(end.deaths, end.simplices)));
+  return turned.empty() || read(turned.data(), turned.size());
 }
 
 bool MeshHistory::WritePlaces(const Sink& write) const {
@@ -296,6 +300,7 @@ core::Expected<std::unique_ptr<MeshHistory>> MeshHistory::Read(int dimension, in
   if (!history->ReadRows(read) || !history->ComputeLives()) {
     return tl::unexpected(OutOfStep("these are not the bytes of a mesh's history"));
   }
+  if (history->orientation_) history->sorted_ = history->SortLiving();
   return history;
 }
 
@@ -312,7 +317,7 @@ bool MeshHistory::ReadRows(const Source& read) {
     marks_.push_back(mark);
   }
   const Mark& end = marks_.back();
-  return end.vertices <= kNone && end.simplices < kNone &&
+  return revisions < kNone && end.vertices <= kNone && end.simplices < kNone &&
          ReadInto(&points_, d_, end.vertices, read) &&
          ReadInto(&rows_, row_size_, end.simplices, read) &&
          ReadInto(&deaths_, 1, end.deaths, read) && ReadWalls(read) && ReadOrientation(read) &&
@@ -325,14 +330,14 @@ bool MeshHistory::ComputeLives() {
     const Mark &from = marks_[revision - 1], &to = marks_[revision];
     for (std::uint64_t i = from.deaths; i < to.deaths; ++i) {
       const std::uint32_t simplex = *deaths_[i];
-      if (simplex >= lives_.size() || lives_[simplex]->died != 0) return false;
-      lives_[simplex]->died = revision;
+      if (simplex >= died_.size() || *died_[simplex] != 0) return false;
+      *died_[simplex] = static_cast<std::uint32_t>(revision);
     }
-    const Life birth{revision, 0};
+    const std::uint32_t alive = 0;
     for (std::uint64_t simplex = from.simplices; simplex < to.simplices; ++simplex) {
       const std::uint32_t* const row = rows_[simplex];
       if (*std::max_element(row, row + row_size_) >= to.vertices) return false;
-      lives_.Append(&birth, 1);
+      died_.Append(&alive, 1);
     }
   }
   return true;
@@ -352,26 +357,36 @@ MeshHistory::Cursor MeshHistory::Begin(std::uint64_t from) const {
 std::uint64_t MeshHistory::MemoryBytes() const {
   const std::lock_guard lock(mutex_);
   return points_.bytes() + places_.capacity() + smoothed_.bytes() + labels_.bytes() +
-         boundary_.capacity() * sizeof(OnWalls) + turned_by_row_.capacity() +
-         (orientation_ ? orientation_->turned.capacity() : 0) + rows_.bytes() + lives_.bytes() +
+         boundary_.capacity() * sizeof(OnWalls) + sorted_.capacity() * sizeof(sorted_[0]) +
+         (orientation_ ? orientation_->turned.capacity() : 0) + rows_.bytes() + died_.bytes() +
          deaths_.bytes() + marks_.capacity() * sizeof(Mark) + appenders_bytes_;
+}
+
+bool MeshHistory::IsSorted(std::uint64_t revision) const {
+  return orientation_.has_value() && revision + 1 == marks_.size();
 }
 
 MeshHistory::Snapshot MeshHistory::At(std::uint64_t revision) const {
   const std::lock_guard lock(mutex_);
   const Mark& mark = marks_[revision];
-  return {mark.vertices, mark.simplices - mark.deaths, mark.vertices + mark.simplices};
+  const std::uint64_t simplices = mark.simplices - mark.deaths,
+                      once = mark.vertices + mark.simplices;
+  return {mark.vertices, simplices, IsSorted(revision) ? once + simplices : once, once + simplices};
 }
 
 MeshHistory::Cursor MeshHistory::BeginAt(std::uint64_t revision, std::uint64_t position) const {
   const std::lock_guard lock(mutex_);
   const Mark& mark = marks_[revision];
-  const std::size_t vertex = std::min<std::size_t>(position, mark.vertices);
-  const bool is_last = revision + 1 == marks_.size();
-  // Nothing was there at revision 0, so nothing goes.
-  return {0,      revision,          mark.deaths,
-          vertex, position - vertex, is_last && orientation_.has_value(),
-          is_last};
+  Cursor cursor{.to = revision, .removed = mark.deaths};  // nothing was there, so nothing goes
+  cursor.vertex = std::min<std::size_t>(position, mark.vertices);
+  cursor.added = position - cursor.vertex;
+  cursor.has_places = revision + 1 == marks_.size();
+  // Positions among the simplices say in which order they are read.
+  cursor.is_sorted = IsSorted(revision) && (cursor.added == 0 || cursor.added > mark.simplices);
+  if (!cursor.is_sorted) return cursor;
+  cursor.unsorted = mark.simplices;
+  if (cursor.added > 0) cursor.added -= mark.simplices;
+  return cursor;
 }
 
 DeltaPart MeshHistory::Next(Cursor* cursor, std::size_t max_bytes) const {
@@ -390,7 +405,7 @@ DeltaPart MeshHistory::Next(Cursor* cursor, std::size_t max_bytes) const {
   part.removed.reserve(std::min({end.deaths - cursor->removed, max_rows, kScanLimit}) * row_size_);
   for (; cursor->removed < end.deaths && scanned < kScanLimit; ++cursor->removed, ++scanned) {
     const std::uint32_t simplex = *deaths_[cursor->removed];
-    if (lives_[simplex]->born > cursor->from) continue;
+    if (simplex >= marks_[cursor->from].simplices) continue;  // born since
     if (part.removed.size() >= max_rows * row_size_) break;
     const std::uint32_t* const row = rows_[simplex];
     part.removed.insert(part.removed.end(), row, row + row_size_);
@@ -427,9 +442,13 @@ DeltaPart MeshHistory::Next(Cursor* cursor, std::size_t max_bytes) const {
     part.walls.push_back(one->walls);
   }
   if (cursor->vertex < end.vertices) return part;  // a position is among vertices or simplices
-  AppendAdded(cursor, end.simplices,
-              room_for(row_bytes, part.removed.empty() && part.points.empty()), &part);
-  part.complete = cursor->added == end.simplices;
+  const std::size_t rows = room_for(row_bytes, part.removed.empty() && part.points.empty());
+  if (cursor->is_sorted) {
+    AppendSorted(cursor, rows, &part);
+  } else {
+    AppendAdded(cursor, end.simplices, rows, &part);
+  }
+  part.complete = cursor->added == (cursor->is_sorted ? sorted_.size() : end.simplices);
   return part;
 }
 
@@ -446,28 +465,38 @@ void MeshHistory::AppendPlaces(std::uint64_t end, DeltaPart* part) const {
   }
 }
 
+void MeshHistory::AppendRow(std::uint32_t simplex, DeltaPart* part) const {
+  const std::uint32_t* const row = rows_[simplex];
+  part->added.insert(part->added.end(), row, row + row_size_);
+  if (labels_.size() == 0) return;
+  part->labels.insert(part->labels.end(), labels_[simplex], labels_[simplex] + label_count_);
+}
+
 // Alive at `to`, from the cursor on: `max_rows` at most.
 void MeshHistory::AppendAdded(Cursor* cursor, std::size_t end, std::size_t max_rows,
                               DeltaPart* part) const {
   const std::size_t stop = std::min(end, cursor->added + kScanLimit);
-  const bool has_bits = cursor->is_oriented && orientation_->orientable;
-  if (cursor->is_oriented) part->orientation.emplace().orientable = has_bits;
   part->added.reserve(std::min(stop - cursor->added, max_rows) * row_size_);
   std::size_t rows = 0;
   for (; cursor->added < stop; ++cursor->added) {
-    const Life& life = *lives_[cursor->added];
-    if (life.died != 0 && life.died <= cursor->to) continue;
-    if (rows == max_rows) return;
-    ++rows;
-    const std::uint32_t* const row = rows_[cursor->added];
-    part->added.insert(part->added.end(), row, row + row_size_);
-    if (labels_.size() > 0)
-      part->labels.insert(part->labels.end(), labels_[cursor->added],
-                          labels_[cursor->added] + label_count_);
-    if (!has_bits) continue;
-    std::vector<std::uint8_t>& turned = part->orientation->turned;
-    turned.resize(BytesOfBits(rows));
-    if (IsSet(turned_by_row_, cursor->added)) Set(&turned, rows - 1);
+    const std::uint32_t died = *died_[cursor->added];
+    if (died != 0 && died <= cursor->to) continue;
+    if (rows++ == max_rows) return;
+    AppendRow(static_cast<std::uint32_t>(cursor->added), part);
+  }
+}
+
+// The same of the last revision, in lexicographic order.
+void MeshHistory::AppendSorted(Cursor* cursor, std::size_t max_rows, DeltaPart* part) const {
+  const std::size_t rows = std::min({sorted_.size() - cursor->added, max_rows, kScanLimit});
+  core::Orientation& orientation = part->orientation.emplace();
+  orientation.orientable = orientation_->orientable;
+  if (orientation.orientable) orientation.turned.resize(BytesOfBits(rows));
+  part->added.reserve(rows * row_size_);
+  for (std::size_t i = 0; i < rows; ++i, ++cursor->added) {
+    AppendRow(sorted_[cursor->added], part);
+    if (orientation.orientable && IsSet(orientation_->turned, cursor->added))
+      Set(&orientation.turned, i);
   }
 }
 

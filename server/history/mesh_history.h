@@ -57,8 +57,8 @@ class GrowingRows {
   std::size_t RowsOfBlock() const { return std::size_t{1} << shift_; }
   std::size_t Offset(std::size_t row) const { return (row & (RowsOfBlock() - 1)) * width_; }
 
-  const std::size_t width_;
-  const int shift_;
+  std::size_t width_;
+  int shift_;
   std::vector<std::unique_ptr<T[]>> blocks_;
   std::size_t size_ = 0;
 };
@@ -84,7 +84,7 @@ struct DeltaPart {
   // and, if it is elsewhere, the position that the complex was built on, d each.
   std::vector<std::uint8_t> places;
   std::vector<double> smoothed;
-  // Of `added`, whose rows are not in lexicographic order; where it is known.
+  // Of `added`, whose rows are in lexicographic order then; where it is known.
   std::optional<core::Orientation> orientation;
   bool complete = false;  // the last part
 };
@@ -135,10 +135,13 @@ class MeshHistory {
   struct Cursor {
     std::uint64_t from = 0, to = 0;
     std::size_t removed = 0, vertex = 0, added = 0;  // next to look at
-    bool is_oriented = false;                        // parts have an orientation
-    bool has_places = false;                         // and places
+    bool has_places = false;                         // parts have places
+    // Simplices are read in lexicographic order, with their orientation, `added` counting those
+    // that are there. Else `added` counts all that there were, `unsorted` in number.
+    bool is_sorted = false;
+    std::size_t unsorted = 0;
 
-    std::uint64_t Position() const { return vertex + added; }
+    std::uint64_t Position() const { return vertex + added + (added > 0 ? unsorted : 0); }
   };
 
   // Reads from `from` to the newest revision. REQUIRES: `from` is not later than that.
@@ -150,19 +153,17 @@ class MeshHistory {
   // The size of the mesh at a revision. BeginAt reads it from the start, or from a position.
   struct Snapshot {
     std::uint64_t vertices = 0, simplices = 0;
-    std::uint64_t positions = 0;  // 0: the start; this: the end
+    std::uint64_t positions = 0;       // 0: the start; this: the last that there is
+    std::uint64_t most_positions = 0;  // that there are once it is oriented, if this is the last
   };
   // REQUIRES: `revision` is not later than the newest.
   Snapshot At(std::uint64_t revision) const;
-  // REQUIRES: `position` is at most At(revision).positions. Cursor::Position is where the next part
-  // begins.
+  // Of the last revision, once it is oriented, simplices come in lexicographic order; but what was
+  // begun before goes on as it began. REQUIRES: `position` is at most At(revision).positions.
+  // Cursor::Position is where the next part begins.
   Cursor BeginAt(std::uint64_t revision, std::uint64_t position) const;
 
  private:
-  struct Life {
-    std::uint64_t born = 0;
-    std::uint64_t died = 0;  // 0: alive
-  };
   bool ReadRows(const Source& read);
   bool WriteWalls(const Sink& write) const;
   bool ReadWalls(const Source& read);
@@ -178,7 +179,10 @@ class MeshHistory {
   bool ComputeLives();
   std::uint32_t Unlink(const std::uint32_t* row);
   void Link(std::uint32_t simplex);
+  bool IsSorted(std::uint64_t revision) const;
+  void AppendRow(std::uint32_t simplex, DeltaPart* part) const;
   void AppendAdded(Cursor* cursor, std::size_t end, std::size_t max_rows, DeltaPart* part) const;
+  void AppendSorted(Cursor* cursor, std::size_t max_rows, DeltaPart* part) const;
 
   const std::size_t row_size_;  // the simplices' dimension, and one
   const std::size_t d_;
@@ -195,7 +199,7 @@ class MeshHistory {
   std::vector<std::uint8_t> places_;
   GrowingRows<double> smoothed_;
   GrowingRows<std::uint32_t> rows_;    // ids of every simplex so far
-  GrowingRows<Life> lives_;            // by simplex
+  GrowingRows<std::uint32_t> died_;    // by simplex, at which revision; 0: alive
   GrowingRows<std::int8_t> labels_;    // by simplex, where it has any; else empty
   GrowingRows<std::uint32_t> deaths_;  // simplices in the order of their removal
   struct Mark {
@@ -203,13 +207,12 @@ class MeshHistory {
   };
   std::vector<Mark> marks_;  // sizes at each revision, 0 first
   bool complete_ = false;    // nothing can be appended
-  // Of the newest revision, once that is the last; and the same with a bit for each simplex so far,
-  // in the order of rows_.
+  // Of the newest revision, once that is the last; and its simplices in lexicographic order.
   std::optional<core::Orientation> orientation_;
-  std::vector<std::uint8_t> turned_by_row_;
+  std::vector<std::uint32_t> sorted_;
 
-  // For the appending thread only: the simplices of the newest revision, in a list for each vertex,
-  // by their lowest vertex. A list is at most as long as a star.
+  // For the appending thread only, until the last revision: the simplices of the newest one, in a
+  // list for each vertex, by their lowest vertex. A list is at most as long as a star.
   std::vector<std::uint32_t> first_of_;            // by vertex
   GrowingRows<std::uint32_t> next_;                // by simplex
   std::atomic<std::uint64_t> appenders_bytes_{0};  // of these two, for other threads

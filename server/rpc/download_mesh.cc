@@ -72,6 +72,8 @@ class DownloadStream final
       cursor_ = history->BeginAt(revision_, position_);
       return;
     }
+    // The server before this one had oriented it.
+    if (!over && position_ <= snapshot_.most_positions) return;
     End(BadPosition(
         position_,
         core::Message("revision ", revision_, " of the mesh ends at ", snapshot_.positions,

@@ -281,6 +281,50 @@ TEST(MeshHistory, EveryRevisionIsReadFromAnyPosition) {
   }
 }
 
+// Reads on from a position with `bytes` at a time, a cursor for each part.
+std::vector<Triangle> ReadOn(const MeshHistory& mesh, std::uint64_t position, std::size_t bytes,
+                             bool* is_oriented) {
+  std::vector<Triangle> rows;
+  for (bool complete = false; !complete;) {
+    MeshHistory::Cursor cursor = mesh.BeginAt(mesh.revision(), position);
+    const DeltaPart part = mesh.Next(&cursor, bytes);
+    *is_oriented = part.orientation.has_value();
+    for (std::size_t i = 0; i < part.added.size(); i += 3)
+      rows.emplace_back(part.added.begin() + i, part.added.begin() + i + 3);
+    position = cursor.Position();
+    complete = part.complete;
+  }
+  return rows;
+}
+
+TEST(MeshHistory, TheLastRevisionIsInOrderOnceItIsOriented) {
+  std::mt19937 random(7);
+  History history;
+  history.Grow(12, &random);
+  MeshHistory& mesh = history.mesh;
+  const std::uint64_t last = mesh.revision();
+  MeshHistory::Cursor early = mesh.BeginAt(last, mesh.At(last).vertices);
+  mesh.Next(&early, 40);
+  const std::uint64_t begun = early.Position();
+  ASSERT_GT(begun, mesh.At(last).vertices);
+  bool is_oriented = false;
+  const std::vector<Triangle> unsorted = ReadOn(mesh, begun, 100, &is_oriented);
+  EXPECT_FALSE(is_oriented);
+  EXPECT_EQ(mesh.At(last).most_positions - mesh.At(last).positions, mesh.At(last).simplices);
+
+  mesh.Orient();
+  const std::vector<Triangle> sorted(history.states[last].begin(), history.states[last].end());
+  for (const std::size_t bytes : {1, 100, 100'000}) {
+    EXPECT_EQ(ReadOn(mesh, 0, bytes, &is_oriented), sorted);
+    EXPECT_TRUE(is_oriented);
+    // What was begun before goes on as it was, also with a cursor of its own.
+    EXPECT_EQ(ReadOn(mesh, begun, bytes, &is_oriented), unsorted);
+    EXPECT_FALSE(is_oriented);
+  }
+  EXPECT_EQ(mesh.At(last).most_positions, mesh.At(last).positions);
+  EXPECT_TRUE(ReadOn(mesh, mesh.At(last).positions, 1, &is_oriented).empty()) << "the end";
+}
+
 // A strip of triangles, all in one round.
 core::MeshDelta Strip(std::uint32_t vertices) {
   core::MeshDelta delta;
