@@ -39,20 +39,20 @@ int DownloadCommand::Run(std::stop_token stop) {
   if (unfinished_) options_.unfinished = Unfinished::kTake;
   ProgressBar bar(quiet_);
   options_.stop = std::move(stop);
-  options_.on_found = [this](int k, int d) { return outputs_.Check(k, d); };
   options_.on_progress = [&bar](const Progress& progress) { bar.Show(progress); };
   options_.on_part = [&bar](auto received, auto all) { bar.ShowPart(received, all); };
   options_.connection.on_outage = [this, &bar](const Outage& outage) {
     bar.Clear();
     PrintOutage(outage, options_.connection.reconnect);
   };
-  const Expected<Mesh> mesh = DownloadMesh(mesh_, options_);
+  const Expected<SavedMesh> mesh = DownloadMeshTo(mesh_, outputs_.paths(), options_);
   bar.Clear();
   return mesh ? Deliver(*mesh) : PrintError(mesh.error());
 }
 
-int DownloadCommand::Deliver(const Mesh& mesh) const {
-  int status = outputs_.Write(mesh, mesh.report.certified() ? kExitCertified : kExitNotCertified);
+int DownloadCommand::Deliver(const SavedMesh& mesh) const {
+  int status = mesh.report.certified() ? kExitCertified : kExitNotCertified;
+  for (const Error& failure : mesh.failures) status = PrintError(failure);
   if (!report_.empty()) {
     const Expected<void> saved = SaveJson(mesh.report, report_);
     if (!saved) status = PrintError(saved.error());
@@ -63,9 +63,9 @@ int DownloadCommand::Deliver(const Mesh& mesh) const {
   } else if (!quiet_ && has_report) {
     PrintText(mesh.report.text);
   } else if (!quiet_) {
-    std::printf("%lld vertices, %lld simplices, not the end of the mesh\n",
-                static_cast<long long>(mesh.points.cols()),
-                static_cast<long long>(mesh.simplices.cols()));
+    std::printf("%llu vertices, %llu simplices, not the end of the mesh\n",
+                static_cast<unsigned long long>(mesh.vertices),
+                static_cast<unsigned long long>(mesh.simplices));
   }
   return status;
 }

@@ -18,7 +18,7 @@ class DownloadCommand {
   int Run(std::stop_token stop);
 
  private:
-  int Deliver(const Mesh& mesh) const;
+  int Deliver(const SavedMesh& mesh) const;
 
   CLI::App* command_;
   ServerOptions server_;

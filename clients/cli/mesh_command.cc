@@ -64,23 +64,25 @@ int MeshCommand::Run(std::stop_token stop) {
   options_.workers = std::max(options_.workers, source_.processes());
   options_.stop = std::move(stop);
   ClosestPointOnly poor(oracle);
-  const Expected<Mesh> mesh = MeshIt(closest_point_only_ ? static_cast<Oracle&>(poor) : oracle);
+  const Expected<SavedMesh> mesh =
+      MeshIt(closest_point_only_ ? static_cast<Oracle&>(poor) : oracle);
   return mesh ? Deliver(*mesh) : PrintError(mesh.error());
 }
 
-Expected<Mesh> MeshCommand::MeshIt(Oracle& oracle) {
+Expected<SavedMesh> MeshCommand::MeshIt(Oracle& oracle) {
   ProgressBar bar(quiet_);
   options_.on_epsilon = [this, &bar](double epsilon, const std::string& reason) {
     bar.Clear();
     if (!quiet_) std::fprintf(stderr, "epsilon %g, %s\n", epsilon, reason.c_str());
   };
   options_.on_progress = [&bar](const Progress& progress) { bar.Show(progress); };
+  options_.on_part = [&bar](auto received, auto all) { bar.ShowPart(received, all); };
   options_.connection.on_outage = [this, &bar](const Outage& outage) {
     bar.Clear();
     PrintOutage(outage, options_.connection.reconnect);
   };
   try {
-    Expected<Mesh> mesh = MeshManifold(oracle, options_);
+    Expected<SavedMesh> mesh = MeshManifoldTo(oracle, outputs_.paths(), options_);
     bar.Clear();
     return mesh;
   } catch (const std::exception& e) {
@@ -89,8 +91,9 @@ Expected<Mesh> MeshCommand::MeshIt(Oracle& oracle) {
   }
 }
 
-int MeshCommand::Deliver(const Mesh& mesh) const {
-  int status = outputs_.Write(mesh, mesh.report.certified() ? kExitCertified : kExitNotCertified);
+int MeshCommand::Deliver(const SavedMesh& mesh) const {
+  int status = mesh.report.certified() ? kExitCertified : kExitNotCertified;
+  for (const Error& failure : mesh.failures) status = PrintError(failure);
   if (!report_.empty()) {
     const Expected<void> saved = SaveJson(mesh.report, report_);
     if (!saved) status = PrintError(saved.error());

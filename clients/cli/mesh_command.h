@@ -20,8 +20,8 @@ class MeshCommand {
   int Run(std::stop_token stop);
 
  private:
-  Expected<Mesh> MeshIt(Oracle& oracle);
-  int Deliver(const Mesh& mesh) const;
+  Expected<SavedMesh> MeshIt(Oracle& oracle);
+  int Deliver(const SavedMesh& mesh) const;
 
   CLI::App* command_;
   OracleSource source_;

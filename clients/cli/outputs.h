@@ -21,6 +21,8 @@ class Outputs {
   // complaint.
   int Write(const Mesh& mesh, int status) const;
 
+  const std::vector<std::string>& paths() const { return paths_; }
+
  private:
   std::vector<std::string> paths_;
 };

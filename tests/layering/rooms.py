@@ -186,7 +186,7 @@ PYTHON = {
     "oracle.py": ("_rows.py", "errors.py"),
     "options.py": (),
     "_wire": ("errors.py", "options.py", "oracle.py", "_wire/enums.py", "proto"),
-    "_files": ("_complex.py", "_version.py", "errors.py"),
+    "_files": ("_complex.py", "_version.py", "errors.py", "report.py"),
     "_findings.py": ("_html.py", "proto"),
     "_rank.py": ("_findings.py", "_lowest.py", "_rows.py", "_shared.py", "oracle.py"),
     "_pipe": ("errors.py",),
@@ -204,7 +204,13 @@ CLIENTS = {
     "clients/cpp/mesh": ("clients/cpp/include",),
     "clients/cpp/wire": ("clients/cpp/include", "proto"),
     "clients/cpp/net": ("clients/cpp/include", "clients/cpp/wire", "proto"),
-    "clients/cpp/run": ("clients/cpp/include", "clients/cpp/net", "clients/cpp/wire", "proto"),
+    "clients/cpp/run": (
+        "clients/cpp/include",
+        "clients/cpp/mesh",
+        "clients/cpp/net",
+        "clients/cpp/wire",
+        "proto",
+    ),
     "clients/view/gateway": (
         "clients/cpp/include",
         "clients/cpp/mesh",

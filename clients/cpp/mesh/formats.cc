@@ -2,151 +2,172 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
+#include <charconv>
 #include <cstdint>
-#include <cstdio>
-#include <cstring>
 #include <string_view>
-#include <type_traits>
-#include <vector>
+#include <utility>
 
-#include "mesh/groups.h"
 #include "mesh/surface.h"
 
 namespace stellate::client {
 namespace {
 
-// Text that grows by snprintf's formats.
-class Text {
+constexpr std::size_t kBlockBytes = std::size_t{1} << 20;  // written at a time
+
+class TextWriter final : public MeshWriter {
  public:
-  void Add(std::string_view piece) { text_ += piece; }
-  void Add(double value) {
-    char number[32];
-    std::snprintf(number, sizeof number, "%.17g", value);
-    text_ += number;
-  }
-  template <typename Columns>
-  void AddNumbers(const Columns& column) {
-    for (Eigen::Index i = 0; i < column.size(); ++i) {
-      if (i > 0) text_ += ' ';
-      if constexpr (std::is_floating_point_v<typename Columns::Scalar>) {
-        Add(column[i]);
-      } else {
-        text_ += std::to_string(column[i]);
-      }
+  TextWriter(Draft draft, TextLayout layout)
+      : draft_(std::move(draft)), layout_(std::move(layout)), text_(layout_.head) {}
+
+  Expected<void> AddPoints(const Eigen::Ref<const Eigen::MatrixXd>& points) override {
+    constexpr Eigen::Index kRows = 4096;
+    for (Eigen::Index first = 0; first < points.cols(); first += kRows) {
+      const auto some = points.middleCols(first, std::min(kRows, points.cols() - first));
+      auto ok = layout_.in_space ? AddLines(layout_.point_prefix, InSpace(some))
+                                 : AddLines(layout_.point_prefix, some);
+      if (!ok) return ok;
     }
+    return {};
   }
-  // A line for each column: the prefix and the column's numbers.
-  template <typename Matrix>
-  void AddLines(std::string_view prefix, const Matrix& matrix) {
-    for (Eigen::Index j = 0; j < matrix.cols(); ++j) {
-      text_ += prefix;
-      AddNumbers(matrix.col(j));
-      text_ += '\n';
-    }
+
+  Expected<void> AddCells(std::size_t group,
+                          const Eigen::Ref<const SimplexMatrix>& cells) override {
+    BeginCells();
+    for (; begun_ <= group; ++begun_) text_ += layout_.groups[begun_].before;
+    return AddLines(layout_.groups[group].prefix, cells);
   }
-  const std::string& str() const { return text_; }
+
+  Expected<void> Finish() override {
+    BeginCells();
+    text_ += layout_.end;
+    if (auto ok = draft_.Write(text_); !ok) return ok;
+    return draft_.Finish();
+  }
 
  private:
-  std::string text_;
+  void BeginCells() {
+    if (std::exchange(in_cells_, true)) return;
+    text_ += layout_.middle;
+    line_ = 0;
+  }
+
+  // As printf's %.17g writes it in the C locale.
+  void Add(double value) {
+    std::array<char, 32> number;
+    const auto end = std::to_chars(number.data(), number.data() + number.size(), value,
+                                   std::chars_format::general, 17);
+    text_.append(number.data(), end.ptr);
+  }
+  void Add(std::uint32_t id) {
+    text_ += std::to_string(std::uint64_t{id} + static_cast<std::uint64_t>(layout_.first_id));
+  }
+
+  template <typename Matrix>
+  Expected<void> AddLines(std::string_view prefix, const Matrix& columns) {
+    for (Eigen::Index j = 0; j < columns.cols(); ++j) {
+      if (layout_.numbered) text_ += std::to_string(++line_);
+      text_ += prefix;
+      for (Eigen::Index i = 0; i < columns.rows(); ++i) {
+        if (i > 0) text_ += ' ';
+        Add(columns(i, j));
+      }
+      text_ += '\n';
+      if (text_.size() < kBlockBytes) continue;
+      if (auto ok = draft_.Write(text_); !ok) return ok;
+      text_.clear();
+    }
+    return {};
+  }
+
+  Draft draft_;
+  TextLayout layout_;
+  std::string text_;  // not yet written
+  bool in_cells_ = false;
+  std::size_t begun_ = 0;   // groups
+  std::uint64_t line_ = 0;  // numbered so far
 };
 
 }  // namespace
 
-Eigen::MatrixXd InSpace(const Mesh& mesh) {
-  Eigen::MatrixXd points = Eigen::MatrixXd::Zero(3, mesh.points.cols());
-  const Eigen::Index rows = std::min<Eigen::Index>(3, mesh.points.rows());
-  points.topRows(rows) = mesh.points.topRows(rows);
-  return points;
+std::uint64_t FileShape::simplices() const {
+  std::uint64_t count = 0;
+  for (const Cells& cells : groups) count += cells.count;
+  return count;
 }
 
-std::string Txt(const Mesh& mesh) {
-  Text text;
-  text.Add(std::to_string(mesh.dimension()) + " " + std::to_string(mesh.ambient_dimension()) + " " +
-           std::to_string(mesh.points.cols()) + " " + std::to_string(mesh.simplices.cols()) + "\n");
-  text.AddLines("", mesh.points);
-  text.AddLines("", mesh.simplices);
-  return text.str();
+std::unique_ptr<MeshWriter> MakeTextWriter(Draft draft, TextLayout layout) {
+  return std::make_unique<TextWriter>(std::move(draft), std::move(layout));
 }
 
-std::string Off(const Mesh& mesh) {
-  Text text;
-  text.Add(mesh.ambient_dimension() == 3
-               ? "OFF\n"
-               : "nOFF\n" + std::to_string(mesh.ambient_dimension()) + "\n");
-  const Drawn drawn =
-      mesh.dimension() == 3 ? DrawnOf(mesh) : Drawn{mesh.points, OrientedSimplices(mesh)};
-  text.Add(std::to_string(drawn.points.cols()) + " " + std::to_string(drawn.simplices.cols()) +
-           " 0\n");
-  text.AddLines("", drawn.points);
-  text.AddLines(std::to_string(drawn.simplices.rows()) + " ", drawn.simplices);
-  return text.str();
+Eigen::MatrixXd InSpace(const Eigen::Ref<const Eigen::MatrixXd>& points) {
+  Eigen::MatrixXd space = Eigen::MatrixXd::Zero(3, points.cols());
+  const Eigen::Index rows = std::min<Eigen::Index>(3, points.rows());
+  space.topRows(rows) = points.topRows(rows);
+  return space;
 }
 
-std::string Obj(const Mesh& mesh) {
+TextLayout Txt(const FileShape& shape) {
+  return {.head = std::to_string(shape.dimension) + " " + std::to_string(shape.ambient_dimension) +
+                  " " + std::to_string(shape.vertices) + " " + std::to_string(shape.simplices()) +
+                  "\n",
+          .groups = {{}}};
+}
+
+TextLayout Off(const FileShape& shape) {
+  const int d = shape.ambient_dimension;
+  return {.head = (d == 3 ? "OFF\n" : "nOFF\n" + std::to_string(d) + "\n") +
+                  std::to_string(shape.vertices) + " " + std::to_string(shape.simplices()) + " 0\n",
+          .groups = {{"", std::to_string(shape.groups[0].dimension + 1) + " "}}};
+}
+
+TextLayout Obj(const FileShape& shape) {
   constexpr const char* kPrefixes[] = {"p ", "l ", "f "};
-  Text text;
-  text.AddLines("v ", InSpace(mesh));
-  const std::vector<Group> groups = GroupsOf(mesh);
-  if (mesh.dimension() == 3 && groups.size() == 1) {  // it is not known on what walls it ends
-    const SimplexMatrix surface = BoundaryOf(OrientedSimplices(mesh));
-    text.AddLines("f ", SimplexMatrix(surface.array() + 1));
+  TextLayout layout{.head = "", .point_prefix = "v ", .in_space = true, .first_id = 1};
+  for (const FileShape::Cells& cells : shape.groups) {
+    layout.groups.push_back(
+        {cells.name.empty() ? "" : "g " + cells.name + "\n", kPrefixes[cells.dimension]});
   }
-  for (const Group& group : groups) {
-    if (group.dimension() == 3) continue;  // a solid is its boundary here
-    if (groups.size() > 1) text.Add("g " + group.name + "\n");
-    text.AddLines(kPrefixes[group.dimension()], SimplexMatrix(group.simplices.array() + 1));
-  }
-  return text.str();
+  return layout;
 }
 
-std::string Ply(const Mesh& mesh) {
-  const bool curve = mesh.dimension() == 1;
-  const Drawn drawn = DrawnOf(mesh);
-  Text text;
-  text.Add("ply\nformat ascii 1.0\nelement vertex " + std::to_string(drawn.points.cols()) +
-           "\nproperty double x\nproperty double y\nproperty double z\nelement " +
-           (curve ? "edge " : "face ") + std::to_string(drawn.simplices.cols()) +
-           (curve ? "\nproperty int vertex1\nproperty int vertex2"
-                  : "\nproperty list uchar int vertex_indices") +
-           "\nend_header\n");
-  text.AddLines("", drawn.points);
-  text.AddLines(curve ? "" : "3 ", drawn.simplices);
-  return text.str();
+TextLayout Ply(const FileShape& shape) {
+  const bool curve = shape.groups[0].dimension == 1;
+  return {.head = "ply\nformat ascii 1.0\nelement vertex " + std::to_string(shape.vertices) +
+                  "\nproperty double x\nproperty double y\nproperty double z\nelement " +
+                  (curve ? "edge " : "face ") + std::to_string(shape.simplices()) +
+                  (curve ? "\nproperty int vertex1\nproperty int vertex2"
+                         : "\nproperty list uchar int vertex_indices") +
+                  "\nend_header\n",
+          .groups = {{"", curve ? "" : "3 "}},
+          .in_space = true};
 }
 
-std::string Msh(const Mesh& mesh) {
+TextLayout Msh(const FileShape& shape) {
   constexpr int kElementTypes[] = {15, 1, 2, 4};  // point, line, triangle, tetrahedron
-  const Eigen::MatrixXd points = InSpace(mesh);
-  const std::vector<Group> groups = GroupsOf(mesh);
-  Text text;
-  text.Add("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n");
-  if (groups.size() > 1) {
-    text.Add("$PhysicalNames\n" + std::to_string(groups.size()) + "\n");
-    for (const Group& group : groups) {
-      text.Add(std::to_string(group.dimension()) + " " + std::to_string(group.tag) + " \"" +
-               group.name + "\"\n");
+  TextLayout layout{.head = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n",
+                    .middle = "$EndNodes\n$Elements\n" + std::to_string(shape.simplices()) + "\n",
+                    .end = "$EndElements\n",
+                    .point_prefix = " ",
+                    .in_space = true,
+                    .numbered = true,
+                    .first_id = 1};
+  if (shape.groups.size() > 1) {
+    layout.head += "$PhysicalNames\n" + std::to_string(shape.groups.size()) + "\n";
+    for (const FileShape::Cells& cells : shape.groups) {
+      layout.head += std::to_string(cells.dimension) + " " + std::to_string(cells.tag) + " \"" +
+                     cells.name + "\"\n";
     }
-    text.Add("$EndPhysicalNames\n");
+    layout.head += "$EndPhysicalNames\n";
   }
-  text.Add("$Nodes\n" + std::to_string(points.cols()) + "\n");
-  for (Eigen::Index j = 0; j < points.cols(); ++j) {
-    text.Add(std::to_string(j + 1) + " ");
-    text.AddLines("", points.col(j));
-  }
-  text.Add("$EndNodes\n$Elements\n" + std::to_string(CountSimplices(groups)) + "\n");
-  Eigen::Index number = 0;
-  for (const Group& group : groups) {
+  layout.head += "$Nodes\n" + std::to_string(shape.vertices) + "\n";
+  for (const FileShape::Cells& cells : shape.groups) {
     // Two tags for each element: its physical group and its geometrical entity, by the same number.
-    char type[64];
-    std::snprintf(type, sizeof type, " %d 2 %d %d ", kElementTypes[group.dimension()], group.tag,
-                  group.tag);
-    const SimplexMatrix simplices = group.simplices.array() + 1;
-    for (Eigen::Index j = 0; j < simplices.cols(); ++j) {
-      text.AddLines(std::to_string(++number) + type, simplices.col(j));
-    }
+    const std::string tag = std::to_string(cells.tag) + " ";
+    layout.groups.push_back(
+        {"", " " + std::to_string(kElementTypes[cells.dimension]) + " 2 " + tag + tag});
   }
-  text.Add("$EndElements\n");
-  return text.str();
+  return layout;
 }
 
 Expected<std::string> Stl(const Mesh& mesh) {

@@ -1,24 +1,74 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
 #include <string>
+#include <vector>
 
+#include "mesh/groups.h"
+#include "mesh/write_file.h"
 #include "stellate/error.h"
 #include "stellate/mesh.h"
 
 namespace stellate::client {
 
-// The contents of a mesh's file; save.cc says which meshes each may be asked for. Numbers are
-// little endian where they are not text.
-std::string Txt(const Mesh& mesh);
-std::string Off(const Mesh& mesh);
-std::string Ply(const Mesh& mesh);
-std::string Obj(const Mesh& mesh);
-std::string Msh(const Mesh& mesh);  // Gmsh's, version 2.2, text
-std::string Vtu(const Mesh& mesh);
-// Binary. kFileFailed for a mesh that is too fine for single precision.
+// What a file is to hold, before any of it is there.
+struct FileShape {
+  struct Cells {
+    int dimension = 0;
+    std::uint64_t count = 0;
+    int tag = 1;
+    std::string name = {};  // of one of several groups
+  };
+  int dimension = 0, ambient_dimension = 0;
+  std::uint64_t vertices = 0;
+  std::vector<Cells> groups = {};
+  Report report = {};  // of a mesh that is over
+
+  std::uint64_t simplices() const;
+};
+
+// A file on its way, a block at a time. What is not finished leaves no file.
+class MeshWriter {
+ public:
+  virtual ~MeshWriter() = default;
+  // Some columns more, all points before any cells; cells group after group, as they are turned.
+  virtual Expected<void> AddPoints(const Eigen::Ref<const Eigen::MatrixXd>& points) = 0;
+  virtual Expected<void> AddCells(std::size_t group,
+                                  const Eigen::Ref<const SimplexMatrix>& cells) = 0;
+  virtual Expected<void> Finish() = 0;
+};
+
+// How a format of text is laid out around the numbers; save.cc says what each is asked to hold.
+struct TextLayout {
+  struct Cells {
+    std::string before, prefix;  // of all of a group, and of each line
+  };
+  std::string head, middle = {}, end = {};  // before, between and after points and cells
+  std::string point_prefix = {};
+  std::vector<Cells> groups = {};
+  bool in_space = false;  // of points the first three coordinates, zeros added
+  bool numbered = false;  // lines begin with their number
+  int first_id = 0;
+};
+TextLayout Txt(const FileShape& shape);
+TextLayout Off(const FileShape& shape);
+TextLayout Obj(const FileShape& shape);
+TextLayout Ply(const FileShape& shape);
+TextLayout Msh(const FileShape& shape);  // Gmsh's, version 2.2
+std::unique_ptr<MeshWriter> MakeTextWriter(Draft draft, TextLayout layout);
+
+// VTK's XML with raw appended data. `mesh` and its `groups`: of a file that has more than points
+// and simplices, which they then are whole; else null.
+std::unique_ptr<MeshWriter> MakeVtuWriter(Draft draft, FileShape shape, const Mesh* mesh = nullptr,
+                                          const std::vector<Group>* groups = nullptr);
+
+// The whole file, binary, little endian. kFileFailed for a mesh that is too fine for single
+// precision.
 Expected<std::string> Stl(const Mesh& mesh);
 
 // The first three coordinates of each point, zeros added.
-Eigen::MatrixXd InSpace(const Mesh& mesh);
+Eigen::MatrixXd InSpace(const Eigen::Ref<const Eigen::MatrixXd>& points);
 
 }  // namespace stellate::client

@@ -139,10 +139,4 @@ std::vector<Group> GroupsOf(const Mesh& mesh) {
   return groups;
 }
 
-Index CountSimplices(const std::vector<Group>& groups) {
-  Index count = 0;
-  for (const Group& group : groups) count += group.simplices.cols();
-  return count;
-}
-
 }  // namespace stellate::client

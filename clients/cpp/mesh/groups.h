@@ -27,6 +27,5 @@ struct Group {
 
 // All of a mesh: one group, where it has no boundary.
 std::vector<Group> GroupsOf(const Mesh& mesh);
-Eigen::Index CountSimplices(const std::vector<Group>& groups);
 
 }  // namespace stellate::client

@@ -1,45 +1,56 @@
 #include <algorithm>
 #include <cctype>
 #include <filesystem>
+#include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "mesh/formats.h"
+#include "mesh/streamed_file.h"
+#include "mesh/surface.h"
 #include "mesh/write_file.h"
 #include "stellate/mesh.h"
 
 namespace stellate {
 namespace {
 
-using client::Msh, client::Obj, client::Off, client::Ply, client::Stl, client::Txt, client::Vtu;
+using client::FileShape, client::Group, client::MeshWriter, client::TextLayout;
 
-using Writer = Expected<std::string> (*)(const Mesh&);
+// What a format holds of a mesh.
+enum class Holds {
+  kRows,      // the simplices as they are
+  kDrawn,     // turned to agree; of a solid its surface
+  kPolygons,  // turned to agree, group by group; of a solid its boundary
+  kGroups,    // turned to agree, group by group
+};
 
 struct FileFormat {
   const char* ending;
   int least_dimension, largest_dimension;  // of what it can hold
   int largest_ambient_dimension;
-  const char* holds;
-  Writer write;
-  bool surface_of_solids = false;  // in space, besides
+  const char* words;
+  Holds holds;
+  TextLayout (*layout)(const FileShape& shape);  // null: it is binary
+  bool surface_of_solids = false;                // in space, besides
 };
-
-template <auto kWrite>
-Expected<std::string> As(const Mesh& mesh) {
-  return kWrite(mesh);
-}
 
 constexpr int kAny = 1 << 30;
+constexpr const char* kStl = ".stl";
 constexpr FileFormat kFormats[] = {
-    {".txt", 0, kAny, kAny, "anything", As<Txt>},
-    {".off", 1, 2, kAny, "curves and surfaces, and the surfaces of solids in space", As<Off>, true},
-    {".obj", 1, 2, 3, "curves and surfaces, and the surfaces of solids in space", As<Obj>, true},
-    {".ply", 1, 2, 3, "curves and surfaces, and the surfaces of solids in space", As<Ply>, true},
-    {".stl", 2, 2, 3, "surfaces, and the surfaces of solids in space", As<Stl>, true},
-    {".msh", 1, 3, 3, "simplices of dimension 3 at most", As<Msh>},
-    {".vtu", 1, 3, kAny, "simplices of dimension 3 at most", As<Vtu>},
+    {".txt", 0, kAny, kAny, "anything", Holds::kRows, client::Txt},
+    {".off", 1, 2, kAny, "curves and surfaces, and the surfaces of solids in space", Holds::kDrawn,
+     client::Off, true},
+    {".obj", 1, 2, 3, "curves and surfaces, and the surfaces of solids in space", Holds::kPolygons,
+     client::Obj, true},
+    {".ply", 1, 2, 3, "curves and surfaces, and the surfaces of solids in space", Holds::kDrawn,
+     client::Ply, true},
+    {kStl, 2, 2, 3, "surfaces, and the surfaces of solids in space", Holds::kDrawn, nullptr, true},
+    {".msh", 1, 3, 3, "simplices of dimension 3 at most", Holds::kGroups, client::Msh},
+    {".vtu", 1, 3, kAny, "simplices of dimension 3 at most", Holds::kGroups, nullptr},
 };
 
-bool Holds(const FileFormat& format, int k, int d) {
+bool CanHold(const FileFormat& format, int k, int d) {
   if (format.surface_of_solids && k == 3 && d == 3) return true;
   return format.least_dimension <= k && k <= format.largest_dimension &&
          d <= format.largest_ambient_dimension;
@@ -55,7 +66,7 @@ std::string EndingOf(const std::string& path) {
 Expected<const FileFormat*> Choose(const std::string& path, int k, int d) {
   std::string able;
   for (const FileFormat& format : kFormats) {
-    if (Holds(format, k, d)) able += std::string(" ") + format.ending;
+    if (CanHold(format, k, d)) able += std::string(" ") + format.ending;
   }
   const std::string ending = EndingOf(path);
   const auto* const format = std::find_if(std::begin(kFormats), std::end(kFormats),
@@ -64,12 +75,62 @@ Expected<const FileFormat*> Choose(const std::string& path, int k, int d) {
     return Fail(ErrorCode::kFileFailed, "no format is known by the ending '" + ending + "' of " +
                                             path + "; known for this mesh:" + able);
   }
-  if (Holds(*format, k, d)) return format;
+  if (CanHold(*format, k, d)) return format;
   const bool high = k >= format->least_dimension && k <= format->largest_dimension;
   return Fail(ErrorCode::kFileFailed,
-              ending + " holds " + (high ? "points of space" : format->holds) + ", and " + path +
+              ending + " holds " + (high ? "points of space" : format->words) + ", and " + path +
                   " would get a mesh of dimension " + std::to_string(k) + " in R^" +
                   std::to_string(d) + "; known for it:" + able);
+}
+
+bool IsStl(const FileFormat& format) { return format.ending == kStl; }
+
+std::unique_ptr<MeshWriter> WriterOf(const FileFormat& format, client::Draft draft,
+                                     const FileShape& shape, const Mesh* mesh = nullptr,
+                                     const std::vector<Group>* groups = nullptr) {
+  if (format.layout != nullptr)
+    return client::MakeTextWriter(std::move(draft), format.layout(shape));
+  return client::MakeVtuWriter(std::move(draft), shape, mesh, groups);
+}
+
+// The simplices that a format holds, and the points of those that it draws.
+std::vector<Group> GroupsOf(const FileFormat& format, const Mesh& mesh, Eigen::MatrixXd* drawn) {
+  if (format.holds == Holds::kRows) return {{1, "", 0, mesh.simplices}};
+  if (format.holds == Holds::kDrawn) {
+    if (mesh.dimension() < 3) return {{1, "", 0, OrientedSimplices(mesh)}};
+    client::Drawn surface = client::DrawnOf(mesh);
+    *drawn = std::move(surface.points);
+    return {{1, "", 0, std::move(surface.simplices)}};
+  }
+  std::vector<Group> groups = client::GroupsOf(mesh);
+  if (format.holds == Holds::kGroups) return groups;
+  if (groups.size() > 1) {
+    std::erase_if(groups, [](const Group& group) { return group.dimension() == 3; });
+  } else {
+    groups[0].name.clear();
+    // It is not known on what walls it ends.
+    if (mesh.dimension() == 3) groups[0].simplices = client::BoundaryOf(groups[0].simplices);
+  }
+  return groups;
+}
+
+Expected<void> Write(const FileFormat& format, const Mesh& mesh, client::Draft draft) {
+  Eigen::MatrixXd drawn;
+  const std::vector<Group> groups = GroupsOf(format, mesh, &drawn);
+  const Eigen::MatrixXd& points = drawn.size() > 0 ? drawn : mesh.points;
+  FileShape shape{mesh.dimension(), mesh.ambient_dimension(),
+                  static_cast<std::uint64_t>(points.cols())};
+  for (const Group& group : groups) {
+    shape.groups.push_back({group.dimension(), static_cast<std::uint64_t>(group.simplices.cols()),
+                            group.tag, group.name});
+  }
+  shape.report = mesh.report;
+  const auto writer = WriterOf(format, std::move(draft), shape, &mesh, &groups);
+  if (auto ok = writer->AddPoints(points); !ok) return ok;
+  for (std::size_t i = 0; i < groups.size(); ++i) {
+    if (auto ok = writer->AddCells(i, groups[i].simplices); !ok) return ok;
+  }
+  return writer->Finish();
 }
 
 }  // namespace
@@ -83,9 +144,42 @@ Expected<void> CheckSave(const std::string& path, int dimension, int ambient_dim
 Expected<void> Mesh::Save(const std::string& path) const {
   const auto format = Choose(path, dimension(), ambient_dimension());
   if (!format) return tl::unexpected(format.error());
-  const Expected<std::string> bytes = (*format)->write(*this);
-  if (!bytes) return tl::unexpected(bytes.error());
-  return client::WriteFile(path, *bytes);
+  if (IsStl(**format)) {
+    const Expected<std::string> bytes = client::Stl(*this);
+    if (!bytes) return tl::unexpected(bytes.error());
+    return client::WriteFile(path, *bytes);
+  }
+  Expected<client::Draft> draft = client::Draft::Begin(path);
+  if (!draft) return tl::unexpected(draft.error());
+  return Write(**format, *this, std::move(*draft));
 }
 
+namespace client {
+
+bool CanStream(const std::string& path, int k, int d, bool has_walls) {
+  const auto format = Choose(path, k, d);
+  if (!format || IsStl(**format) || Draft::IsSpecial(path)) return false;
+  switch ((*format)->holds) {
+    case Holds::kRows:
+      return true;
+    case Holds::kDrawn:
+      return k < 3;
+    case Holds::kPolygons:
+      return k < 3 && !has_walls;
+    case Holds::kGroups:
+      return !has_walls;
+  }
+  return false;
+}
+
+Expected<StreamedFile> StreamedFile::Begin(const std::string& path, const FileShape& shape) {
+  const auto format = Choose(path, shape.dimension, shape.ambient_dimension);
+  if (!format) return tl::unexpected(format.error());
+  Expected<Draft> draft = Draft::Begin(path);
+  if (!draft) return tl::unexpected(draft.error());
+  return StreamedFile{WriterOf(**format, std::move(*draft), shape),
+                      (*format)->holds != Holds::kRows};
+}
+
+}  // namespace client
 }  // namespace stellate

@@ -40,7 +40,7 @@ SimplexMatrix BoundaryOf(const SimplexMatrix& simplices) {
 }
 
 Drawn DrawnOf(const Mesh& mesh) {
-  Drawn drawn{InSpace(mesh), OrientedSimplices(mesh)};
+  Drawn drawn{InSpace(mesh.points), OrientedSimplices(mesh)};
   if (mesh.dimension() != 3) return drawn;
   drawn.simplices = BoundaryOf(drawn.simplices);
   std::vector<Vertex> used(drawn.simplices.reshaped().begin(), drawn.simplices.reshaped().end());

@@ -1,9 +1,11 @@
 // VTK's XML files of unstructured grids.
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <cstring>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "mesh/formats.h"
@@ -12,6 +14,8 @@
 
 namespace stellate::client {
 namespace {
+
+constexpr std::size_t kRows = std::size_t{1} << 14;  // at a time, of what is not given in blocks
 
 std::string Base64(std::string_view bytes) {
   constexpr std::string_view kDigits =
@@ -30,23 +34,17 @@ std::string Base64(std::string_view bytes) {
   return text;
 }
 
-// A DataArray element with its numbers inline, as VTK reads them: the byte count, then the bytes.
+// A DataArray element of FieldData with its numbers inline, as VTK reads them: the byte count, then
+// the bytes.
 template <typename Number>
-std::string DataArray(const char* type, const char* name, int components, const Number* data,
-                      Eigen::Index count, const std::string& more = "") {
-  const std::uint64_t size = static_cast<std::uint64_t>(count) * sizeof(Number);
+std::string Field(const char* type, const char* name, const Number* data, std::size_t count) {
+  const std::uint64_t size = count * sizeof(Number);
   std::string bytes(sizeof size + size, '\0');
   std::memcpy(bytes.data(), &size, sizeof size);
   if (size > 0) std::memcpy(bytes.data() + sizeof size, data, size);
   return std::string("<DataArray type=\"") + type + "\" Name=\"" + name +
-         "\" NumberOfComponents=\"" + std::to_string(components) + "\"" + more +
-         " format=\"binary\">" + Base64(bytes) + "</DataArray>\n";
-}
-
-template <typename Number>
-std::string Field(const char* type, const char* name, const Number* data, size_t count) {
-  return DataArray(type, name, 1, data, static_cast<Eigen::Index>(count),
-                   " NumberOfTuples=\"" + std::to_string(count) + "\"");
+         "\" NumberOfComponents=\"1\" NumberOfTuples=\"" + std::to_string(count) +
+         "\" format=\"binary\">" + Base64(bytes) + "</DataArray>\n";
 }
 
 // Text as its bytes, which every reader takes.
@@ -55,11 +53,12 @@ std::string Field(const char* name, const std::string& text) {
 }
 
 // What the file says of the whole mesh.
-std::string FieldData(const Report& report, const std::vector<Group>& groups) {
+std::string FieldData(const FileShape& shape) {
   std::string xml = "<FieldData>\n" + Field("version", "stellate " STELLATE_VERSION);
   std::string names;
-  for (const Group& group : groups) names += group.name + "\n";
-  if (groups.size() > 1) xml += Field("groups", names);
+  for (const FileShape::Cells& cells : shape.groups) names += cells.name + "\n";
+  if (shape.groups.size() > 1) xml += Field("groups", names);
+  const Report& report = shape.report;
   if (report.termination != Termination::kUnknown) {
     const std::uint8_t certified = report.certified() ? 1 : 0;
     xml +=
@@ -69,77 +68,222 @@ std::string FieldData(const Report& report, const std::vector<Group>& groups) {
   return xml + "</FieldData>\n";
 }
 
-std::string Cells(const std::vector<Group>& groups) {
-  // vertex, line, triangle, tetrahedron
-  constexpr std::array<std::uint8_t, 4> kCellTypes = {1, 3, 5, 10};
-  std::vector<std::int64_t> connectivity, offsets;
-  std::vector<std::uint8_t> types;
-  for (const Group& group : groups) {
-    const auto width = static_cast<size_t>(group.simplices.rows());
-    for (const std::uint32_t id : group.simplices.reshaped()) connectivity.push_back(id);
-    for (Eigen::Index j = 0; j < group.simplices.cols(); ++j) {
-      const std::int64_t last = offsets.empty() ? 0 : offsets.back();
-      offsets.push_back(last + static_cast<std::int64_t>(width));
-      types.push_back(kCellTypes[width - 1]);
-    }
-  }
-  const auto array = [](const char* type, const char* name, const auto& values) {
-    return DataArray(type, name, 1, values.data(), std::ssize(values));
-  };
-  return "<Cells>\n" + array("Int64", "connectivity", connectivity) +
-         array("Int64", "offsets", offsets) + array("UInt8", "types", types) + "</Cells>\n";
-}
+// The appended arrays in the order of the file, wider numbers first: each number begins at a
+// multiple of its size, so that a file can be mapped into memory.
+enum ArrayName {
+  kPoints,
+  kCoordinates,
+  kPointWalls,
+  kConnectivity,
+  kOffsets,
+  kCellWalls,
+  kGroup,
+  kRegion,
+  kSides,
+  kTypes,
+  kArrays
+};
 
-std::string PointData(const Mesh& mesh) {
-  std::string xml;
-  if (mesh.ambient_dimension() > 3) {
-    xml += DataArray("Float64", "coordinates", mesh.ambient_dimension(), mesh.points.data(),
-                     mesh.points.size());
-  }
-  if (!mesh.walls.empty()) {
-    xml += DataArray("UInt64", "walls", 1, mesh.walls.data(), std::ssize(mesh.walls));
-  }
-  return xml.empty() ? xml : "<PointData>\n" + xml + "</PointData>\n";
-}
+struct Appended {
+  const char *type, *name;
+  int components = 1;
+  std::uint64_t row_bytes = 0, rows = 0;
+  bool is_there = true;
+  std::uint64_t place = 0;    // in the file, of the byte count before it
+  std::uint64_t written = 0;  // without that
+  bool is_begun = false;
 
-// The groups of the cells, which are not all of one, and the labels of a mesh that has some.
-std::string CellData(const std::vector<Group>& groups, bool has_labels) {
-  std::vector<std::int32_t> tags, regions, sides;
-  std::vector<std::uint64_t> walls;
-  for (const Group& group : groups) {
-    const auto count = static_cast<size_t>(group.simplices.cols());
-    tags.insert(tags.end(), count, group.tag);
-    walls.insert(walls.end(), count, group.walls);
-    regions.insert(regions.end(), count, group.label);
-    for (size_t j = 0; j < count; ++j) {
-      const Sides of = group.sides.empty() ? Sides() : group.sides[j];
-      sides.insert(sides.end(), {of.behind, of.ahead});
+  std::uint64_t bytes() const { return row_bytes * rows; }
+};
+
+class VtuWriter final : public MeshWriter {
+ public:
+  VtuWriter(Draft draft, FileShape shape, const Mesh* mesh, const std::vector<Group>* groups)
+      : draft_(std::move(draft)), shape_(std::move(shape)), mesh_(mesh), groups_(groups) {
+    const std::uint64_t n = shape_.vertices, m = shape_.simplices();
+    const auto d = static_cast<std::uint64_t>(shape_.ambient_dimension);
+    const bool has_walls = mesh != nullptr && !mesh->walls.empty();
+    const bool has_labels = mesh != nullptr && (!mesh->labels.empty() || mesh->is_boundary());
+    const bool has_groups = shape_.groups.size() > 1 || has_labels;
+    std::uint64_t ids = 0;
+    for (const FileShape::Cells& cells : shape_.groups)
+      ids += cells.count * (static_cast<std::uint64_t>(cells.dimension) + 1);
+    arrays_ = {{
+        {"Float64", "Points", 3, 24, n},
+        {"Float64", "coordinates", shape_.ambient_dimension, 8 * d, n, d > 3},
+        {"UInt64", "walls", 1, 8, n, has_walls},
+        {"Int64", "connectivity", 1, 8, ids},
+        {"Int64", "offsets", 1, 8, m},
+        {"UInt64", "walls", 1, 8, m, has_groups},
+        {"Int32", "group", 1, 4, m, has_groups},
+        {"Int32", "region", 1, 4, m, has_labels},
+        {"Int32", "sides", 2, 8, m, has_labels},
+        {"UInt8", "types", 1, 1, m},
+    }};
+    head_ = Head();
+    std::uint64_t place = head_.size();
+    for (Appended& array : arrays_) {
+      if (!array.is_there) continue;
+      array.place = place;
+      place += sizeof(std::uint64_t) + array.bytes();
     }
+    end_ = place;
   }
-  std::string xml = DataArray("Int32", "group", 1, tags.data(), std::ssize(tags)) +
-                    DataArray("UInt64", "walls", 1, walls.data(), std::ssize(walls));
-  if (has_labels) {
-    xml += DataArray("Int32", "region", 1, regions.data(), std::ssize(regions)) +
-           DataArray("Int32", "sides", 2, sides.data(), std::ssize(sides));
+
+  Expected<void> AddPoints(const Eigen::Ref<const Eigen::MatrixXd>& points) override {
+    const Eigen::MatrixXd space = InSpace(points);
+    if (auto ok = Append(kPoints, space.data(), space.size()); !ok) return ok;
+    if (!arrays_[kCoordinates].is_there) return {};
+    const Eigen::MatrixXd dense = points;
+    return Append(kCoordinates, dense.data(), dense.size());
   }
-  return "<CellData>\n" + xml + "</CellData>\n";
-}
+
+  Expected<void> AddCells(std::size_t /*group*/,
+                          const Eigen::Ref<const SimplexMatrix>& cells) override {
+    if (auto ok = AddWalls(); !ok) return ok;
+    constexpr auto kCols = static_cast<Eigen::Index>(kRows);
+    for (Eigen::Index first = 0; first < cells.cols(); first += kCols) {
+      const Eigen::Matrix<std::int64_t, Eigen::Dynamic, Eigen::Dynamic> ids =
+          cells.middleCols(first, std::min(kCols, cells.cols() - first)).cast<std::int64_t>();
+      if (auto ok = Append(kConnectivity, ids.data(), ids.size()); !ok) return ok;
+    }
+    return {};
+  }
+
+  Expected<void> Finish() override {
+    if (auto ok = AddWalls(); !ok) return ok;
+    for (const ArrayName name : {kPoints, kCoordinates, kPointWalls, kConnectivity}) {
+      if (auto ok = Begin(name); !ok) return ok;  // where there is nothing
+    }
+    std::int64_t last = 0;
+    auto ok = Fill<std::int64_t>(kOffsets, [&last](std::size_t width, const Group*, std::size_t) {
+      return last += static_cast<std::int64_t>(width);
+    });
+    if (ok) {
+      ok = Fill<std::uint64_t>(
+          kCellWalls, [](std::size_t, const Group* group, std::size_t) { return group->walls; });
+    }
+    if (ok) {
+      ok = Fill<std::int32_t>(
+          kGroup, [](std::size_t, const Group* group, std::size_t) { return group->tag; });
+    }
+    if (ok) {
+      ok = Fill<std::int32_t>(
+          kRegion, [](std::size_t, const Group* group, std::size_t) { return group->label; });
+    }
+    if (ok) {
+      ok = Fill<std::array<std::int32_t, 2>>(
+          kSides, [](std::size_t, const Group* group, std::size_t j) {
+            const Sides sides = group->sides.empty() ? Sides() : group->sides[j];
+            return std::array<std::int32_t, 2>{sides.behind, sides.ahead};
+          });
+    }
+    if (ok) {
+      // vertex, line, triangle, tetrahedron
+      constexpr std::array<std::uint8_t, 4> kCellTypes = {1, 3, 5, 10};
+      ok = Fill<std::uint8_t>(kTypes, [&kCellTypes](std::size_t width, const Group*, std::size_t) {
+        return kCellTypes[width - 1];
+      });
+    }
+    if (ok) ok = draft_.WriteAt(end_, "\n</AppendedData>\n</VTKFile>\n");
+    return ok ? draft_.Finish() : ok;
+  }
+
+ private:
+  // Up to the first array's byte count, which begins at a multiple of 8.
+  std::string Head() const {
+    std::string xml =
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" "
+        "byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<UnstructuredGrid>\n" +
+        FieldData(shape_) + "<Piece NumberOfPoints=\"" + std::to_string(shape_.vertices) +
+        "\" NumberOfCells=\"" + std::to_string(shape_.simplices()) + "\">\n" +
+        Section("Points", {kPoints}) + Section("Cells", {kConnectivity, kOffsets, kTypes}) +
+        Section("PointData", {kCoordinates, kPointWalls}) +
+        Section("CellData", {kGroup, kCellWalls, kRegion, kSides}) +
+        "</Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n";
+    while (xml.size() % 8 != 7) xml += ' ';
+    return xml + "_";
+  }
+
+  std::string Section(const std::string& name, const std::vector<ArrayName>& arrays) const {
+    std::string xml;
+    for (const ArrayName which : arrays) {
+      const Appended& array = arrays_[which];
+      if (!array.is_there) continue;
+      std::uint64_t offset = 0;
+      for (std::size_t i = 0; i < which; ++i)
+        if (arrays_[i].is_there) offset += sizeof(std::uint64_t) + arrays_[i].bytes();
+      xml += std::string("<DataArray type=\"") + array.type + "\" Name=\"" + array.name +
+             "\" NumberOfComponents=\"" + std::to_string(array.components) +
+             "\" format=\"appended\" offset=\"" + std::to_string(offset) + "\"/>\n";
+    }
+    return xml.empty() ? xml : "<" + name + ">\n" + xml + "</" + name + ">\n";
+  }
+
+  // Writes the byte count before an array, and what comes before the first one.
+  Expected<void> Begin(ArrayName name) {
+    Appended& array = arrays_[name];
+    if (!array.is_there || std::exchange(array.is_begun, true)) return {};
+    if (!head_.empty()) {
+      if (auto ok = draft_.WriteAt(0, std::exchange(head_, {})); !ok) return ok;
+    }
+    const std::uint64_t size = array.bytes();
+    return draft_.WriteAt(array.place, {reinterpret_cast<const char*>(&size), sizeof size});
+  }
+
+  template <typename Number>
+  Expected<void> Append(ArrayName name, const Number* data, Eigen::Index count) {
+    if (auto ok = Begin(name); !ok) return ok;
+    Appended& array = arrays_[name];
+    const std::string_view bytes(reinterpret_cast<const char*>(data),
+                                 static_cast<std::size_t>(count) * sizeof(Number));
+    const std::uint64_t place = array.place + sizeof(std::uint64_t) + array.written;
+    array.written += bytes.size();
+    return draft_.WriteAt(place, bytes);
+  }
+
+  Expected<void> AddWalls() {
+    if (!arrays_[kPointWalls].is_there || arrays_[kPointWalls].is_begun) return {};
+    return Append(kPointWalls, mesh_->walls.data(), std::ssize(mesh_->walls));
+  }
+
+  // One row a simplex: row(vertices of it, its group if there are any, its number there).
+  template <typename Number, typename Row>
+  Expected<void> Fill(ArrayName name, const Row& row) {
+    if (!arrays_[name].is_there) return {};
+    if (auto ok = Begin(name); !ok) return ok;
+    std::vector<Number> block;
+    const auto flush = [&] {
+      const auto ok = Append(name, block.data(), std::ssize(block));
+      block.clear();
+      return ok;
+    };
+    for (std::size_t g = 0; g < shape_.groups.size(); ++g) {
+      const FileShape::Cells& cells = shape_.groups[g];
+      const Group* const group = groups_ == nullptr ? nullptr : &(*groups_)[g];
+      for (std::uint64_t j = 0; j < cells.count; ++j) {
+        block.push_back(row(static_cast<std::size_t>(cells.dimension) + 1, group, j));
+        if (block.size() < kRows) continue;
+        if (auto ok = flush(); !ok) return ok;
+      }
+    }
+    return flush();
+  }
+
+  Draft draft_;
+  FileShape shape_;
+  const Mesh* mesh_;
+  const std::vector<Group>* groups_;
+  std::array<Appended, kArrays> arrays_;
+  std::string head_;  // until it is written
+  std::uint64_t end_ = 0;
+};
 
 }  // namespace
 
-std::string Vtu(const Mesh& mesh) {
-  const std::vector<Group> groups = GroupsOf(mesh);
-  const Eigen::MatrixXd points = InSpace(mesh);
-  std::string xml =
-      "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" "
-      "byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<UnstructuredGrid>\n" +
-      FieldData(mesh.report, groups) + "<Piece NumberOfPoints=\"" + std::to_string(points.cols()) +
-      "\" NumberOfCells=\"" + std::to_string(CountSimplices(groups)) + "\">\n<Points>\n" +
-      DataArray("Float64", "Points", 3, points.data(), points.size()) + "</Points>\n" +
-      Cells(groups) + PointData(mesh);
-  const bool has_labels = !mesh.labels.empty() || mesh.is_boundary();
-  if (groups.size() > 1 || has_labels) xml += CellData(groups, has_labels);
-  return xml + "</Piece>\n</UnstructuredGrid>\n</VTKFile>\n";
+std::unique_ptr<MeshWriter> MakeVtuWriter(Draft draft, FileShape shape, const Mesh* mesh,
+                                          const std::vector<Group>* groups) {
+  return std::make_unique<VtuWriter>(std::move(draft), std::move(shape), mesh, groups);
 }
 
 }  // namespace stellate::client

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <string_view>
 
@@ -7,8 +8,39 @@
 
 namespace stellate::client {
 
-// Puts the bytes in the place of whatever was there, whole or not at all: what cannot be written to
-// its end leaves the old file. kFileFailed, with the system's reason.
+// A file that is written piece by piece beside the path, and takes its place when it is whole.
+// What is not finished leaves no trace, and the old file. Errors are kFileFailed, with the system's
+// reason.
+//
+//   Expected<Draft> draft = Draft::Begin(path);
+//   if (auto ok = draft->Write(bytes); !ok) return ok;
+//   return draft->Finish();
+class Draft {
+ public:
+  static Expected<Draft> Begin(const std::string& path);
+  ~Draft();
+  Draft(Draft&& other) noexcept;
+  Draft& operator=(Draft&&) = delete;
+
+  // A pipe or a device: written as it is, since nothing may take its place, and in order.
+  static bool IsSpecial(const std::string& path);
+
+  Expected<void> Write(std::string_view bytes) { return WriteAt(end_, bytes); }  // at the end
+  // Beyond the end leaves zeros between.
+  Expected<void> WriteAt(std::uint64_t place, std::string_view bytes);
+  Expected<void> Finish();
+
+ private:
+  Draft(std::string path, std::string target, std::string draft, int file)
+      : path_(std::move(path)), target_(std::move(target)), draft_(std::move(draft)), file_(file) {}
+  void Drop();
+
+  std::string path_, target_, draft_;  // the last empty: written as it is
+  int file_ = -1;
+  std::uint64_t end_ = 0;
+};
+
+// Puts the bytes in the place of whatever was there, whole or not at all.
 Expected<void> WriteFile(const std::string& path, std::string_view bytes);
 
 // kFileFailed where WriteFile could not even begin.

@@ -1,13 +1,17 @@
 #include "stellate/download.h"
 
+#include <algorithm>
 #include <chrono>
+#include <functional>
 #include <memory>
-#include <optional>
 #include <utility>
 
+#include "mesh/streamed_file.h"
 #include "net/channel.h"
 #include "net/reconnect.h"
 #include "run/delta_mesh.h"
+#include "run/download.h"
+#include "run/part_files.h"
 #include "run/run.h"
 #include "stellate/monitor.h"
 #include "stellate/v1/stellate.grpc.pb.h"
@@ -37,23 +41,108 @@ class Download {
 
   Expected<Mesh> Go() {
     const std::stop_callback cancel(options_.stop, [this] { attempts_.Stop(); });
-    if (auto ok = Look(); !ok) return tl::unexpected(ok.error());
-    const int k = SimplexDimension(status_.spec());
-    const auto d = static_cast<int>(status_.spec().ambient_dimension());
-    if (options_.on_found) {
-      if (auto ok = options_.on_found(k, d); !ok) return tl::unexpected(ok.error());
+    if (auto ok = Begin({}); !ok) return tl::unexpected(ok.error());
+    return FetchWhole();
+  }
+
+  Expected<SavedMesh> GoTo(const std::vector<std::string>& paths) {
+    const std::stop_callback cancel(options_.stop, [this] { attempts_.Stop(); });
+    if (auto ok = Begin(paths); !ok) return tl::unexpected(ok.error());
+    if (paths.empty() && IsLast()) {
+      const Report report = ReportOf(status_);
+      return Saved(report, report.counts.vertices, report.counts.simplices, 0, {});
     }
-    if (options_.revision == 0) {
-      if (auto ok = Settle(); !ok) return tl::unexpected(ok.error());
+    if (CanStream(paths)) {
+      PartFiles files(paths, k(), d(), ReportOf(status_));
+      const Expected<bool> fetched = FetchInto(&files);
+      if (!fetched) return tl::unexpected(fetched.error());
+      if (*fetched)
+        return Saved(ReportOf(status_), files.vertices(), files.simplices(), paths.size(),
+                     files.Finish());
     }
-    auto builder = DeltaMesh::Create(k, d, status_.spec().boundary_only());
-    if (!builder) return tl::unexpected(builder.error());
-    builder_ = std::make_unique<DeltaMesh>(std::move(*builder));
-    if (auto ok = Fetch(); !ok) return tl::unexpected(ok.error());
-    return Conclude();
+    const Expected<Mesh> mesh = FetchWhole();
+    if (!mesh) return tl::unexpected(mesh.error());
+    std::vector<Error> failures;
+    for (const std::string& path : paths) {
+      if (const Expected<void> saved = mesh->Save(path); !saved) failures.push_back(saved.error());
+    }
+    return Saved(mesh->report, static_cast<std::uint64_t>(mesh->points.cols()),
+                 static_cast<std::uint64_t>(mesh->simplices.cols()), paths.size(),
+                 std::move(failures));
   }
 
  private:
+  int k() const { return SimplexDimension(status_.spec()); }
+  int d() const { return static_cast<int>(status_.spec().ambient_dimension()); }
+
+  // Everything before the transfer.
+  Expected<void> Begin(const std::vector<std::string>& paths) {
+    if (auto ok = Look(); !ok) return ok;
+    for (const std::string& path : paths) {
+      if (auto ok = CheckSave(path, k(), d()); !ok) return ok;
+    }
+    return options_.revision == 0 ? Settle() : Expected<void>();
+  }
+
+  bool IsLast() const {
+    return HasEnded(status_) && (options_.revision == 0 || options_.revision == status_.revision());
+  }
+
+  bool CanStream(const std::vector<std::string>& paths) const {
+    return IsLast() && std::all_of(paths.begin(), paths.end(), [this](const std::string& path) {
+             return client::CanStream(path, k(), d(), status_.spec().walls() > 0);
+           });
+  }
+
+  Expected<SavedMesh> Saved(const Report& report, std::uint64_t vertices, std::uint64_t simplices,
+                            std::size_t paths, std::vector<Error> failures) const {
+    if (paths > 0 && failures.size() == paths) return tl::unexpected(std::move(failures.front()));
+    return SavedMesh{k(), d(), vertices, simplices, report, std::move(failures)};
+  }
+
+  Expected<Mesh> FetchWhole() {
+    auto builder = DeltaMesh::Create(k(), d(), status_.spec().boundary_only());
+    if (!builder) return tl::unexpected(builder.error());
+    builder_ = std::make_unique<DeltaMesh>(std::move(*builder));
+    const auto add = [this](v1::DownloadMeshResponse&& part) -> Expected<bool> {
+      if (auto ok = builder_->Add(std::move(part)); !ok) return tl::unexpected(ok.error());
+      if (builder_->vertices() > vertices_ || builder_->simplices() > simplices_)
+        return tl::unexpected(BrokenProtocol("more of the mesh than it had announced"));
+      Tell(builder_->vertices() + builder_->simplices());
+      return true;
+    };
+    if (const auto ok = Fetch(add); !ok) return tl::unexpected(ok.error());
+    return Conclude();
+  }
+
+  // False: not what can be written as it comes.
+  Expected<bool> FetchInto(PartFiles* files) {
+    const auto take = [this, files](v1::DownloadMeshResponse&& part) -> Expected<bool> {
+      if (part.revision() != status_.revision()) return false;
+      const auto taken = files->Take(part);
+      if (!taken) return tl::unexpected(taken.error());
+      Tell(files->vertices() + files->simplices());
+      return *taken == PartFiles::Taken::kYes;
+    };
+    const Expected<bool> fetched = Fetch(take);
+    if (!fetched || !*fetched) return fetched;
+    if (auto ok = CheckSize(files->vertices(), files->simplices()); !ok)
+      return tl::unexpected(ok.error());
+    return true;
+  }
+
+  void Tell(std::uint64_t received) const {
+    if (options_.on_part) options_.on_part(received, vertices_ + simplices_);
+  }
+
+  Expected<void> CheckSize(std::uint64_t vertices, std::uint64_t simplices) const {
+    if (vertices == vertices_ && simplices == simplices_) return {};
+    return tl::unexpected(
+        BrokenProtocol(std::to_string(vertices) + " vertices and " + std::to_string(simplices) +
+                       " simplices, after it had announced " + std::to_string(vertices_) + " and " +
+                       std::to_string(simplices_)));
+  }
+
   // Not tried again: a server that cannot be reached in the first place is an error at once.
   Expected<void> Look() {
     grpc::ClientContext context;
@@ -112,7 +201,9 @@ class Download {
     return tl::unexpected(Lost(status));
   }
 
-  Expected<void> Fetch() {
+  // Gives each part to `add`, which returns whether it wants more of them: true if it always did.
+  using Add = std::function<Expected<bool>(v1::DownloadMeshResponse&& part)>;
+  Expected<bool> Fetch(const Add& add) {
     v1::DownloadMeshRequest request;
     request.set_name(name_);
     request.set_revision(options_.revision);
@@ -129,21 +220,16 @@ class Download {
         request.set_position(part.next_position());
         vertices_ = part.vertices();
         simplices_ = part.simplices();
-        auto ok = builder_->Add(std::move(part));
-        if (ok && (builder_->vertices() > vertices_ || builder_->simplices() > simplices_))
-          ok = tl::unexpected(BrokenProtocol("more of the mesh than it had announced"));
-        if (!ok) {
+        Expected<bool> more = add(std::move(part));
+        if (!more || !*more) {
           context.TryCancel();
-          return ok;
-        }
-        if (options_.on_part) {
-          options_.on_part(builder_->vertices() + builder_->simplices(), vertices_ + simplices_);
+          return more;
         }
       }
       status = stream->Finish();
       if (complete) {
         revision_ = request.revision();
-        return {};
+        return true;
       }
     } while (attempts_.Again(status));
     return tl::unexpected(Lost(status));
@@ -160,13 +246,10 @@ class Download {
   Expected<Mesh> Conclude() {
     Expected<Mesh> mesh = builder_->Take();
     if (!mesh) return mesh;
-    const auto vertices = static_cast<std::uint64_t>(mesh->points.cols());
-    const auto simplices = static_cast<std::uint64_t>(mesh->simplices.cols());
-    if (vertices != vertices_ || simplices != simplices_) {
-      return tl::unexpected(
-          BrokenProtocol(std::to_string(vertices) + " vertices and " + std::to_string(simplices) +
-                         " simplices, after it had announced " + std::to_string(vertices_) +
-                         " and " + std::to_string(simplices_)));
+    if (auto ok = CheckSize(static_cast<std::uint64_t>(mesh->points.cols()),
+                            static_cast<std::uint64_t>(mesh->simplices.cols()));
+        !ok) {
+      return tl::unexpected(ok.error());
     }
     mesh->region_names.assign(status_.spec().region_names().begin(),
                               status_.spec().region_names().end());
@@ -180,21 +263,39 @@ class Download {
   const std::string name_;
   const DownloadOptions& options_;
   Reconnector attempts_;
-  v1::Mesh status_;  // without geometry
-  std::unique_ptr<DeltaMesh> builder_;
+  v1::Mesh status_;                                            // without geometry
+  std::unique_ptr<DeltaMesh> builder_;                         // of what is fetched whole
   std::uint64_t revision_ = 0, vertices_ = 0, simplices_ = 0;  // of what was fetched
 };
 
-}  // namespace
-}  // namespace client
-
-Expected<Mesh> DownloadMesh(const std::string& name, const DownloadOptions& options) {
+Expected<std::shared_ptr<grpc::Channel>> ConnectFor(const DownloadOptions& options) {
   if (options.connection.server.empty()) {
     return Fail(ErrorCode::kRefused, "no server is given: say where the mesh is");
   }
-  const auto channel = client::Connect(options.connection);
+  return Connect(options.connection);
+}
+
+}  // namespace
+
+Expected<SavedMesh> DownloadTo(const std::shared_ptr<grpc::Channel>& channel,
+                               const std::string& name, const std::vector<std::string>& paths,
+                               const DownloadOptions& options) {
+  return Download(channel, name, options).GoTo(paths);
+}
+
+}  // namespace client
+
+Expected<Mesh> DownloadMesh(const std::string& name, const DownloadOptions& options) {
+  const auto channel = client::ConnectFor(options);
   if (!channel) return tl::unexpected(channel.error());
   return client::Download(*channel, name, options).Go();
+}
+
+Expected<SavedMesh> DownloadMeshTo(const std::string& name, const std::vector<std::string>& paths,
+                                   const DownloadOptions& options) {
+  const auto channel = client::ConnectFor(options);
+  if (!channel) return tl::unexpected(channel.error());
+  return client::DownloadTo(*channel, name, paths, options);
 }
 
 }  // namespace stellate

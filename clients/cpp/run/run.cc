@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "run/declare.h"
+#include "run/download.h"
 #include "wire/convert.h"
 #include "wire/status.h"
 
@@ -22,12 +23,13 @@ void SetDeadline(grpc::ClientContext& context) {
 }  // namespace
 
 Run::Run(const std::shared_ptr<grpc::Channel>& channel, Oracle& oracle, const MeshOptions& options,
-         std::function<bool()> hopeless)
+         std::function<bool()> hopeless, Watching watching)
     : channel_(channel),
       stub_(v1::Stellate::NewStub(channel)),
       oracle_(oracle),
       options_(options),
-      hopeless_(std::move(hopeless)) {
+      hopeless_(std::move(hopeless)),
+      watching_(watching) {
   ReconnectPolicy policy = Policy();
   policy.on_outage = options.connection.on_outage;
   watch_ = std::make_unique<Reconnector>(std::move(policy));
@@ -97,7 +99,7 @@ Expected<void> Run::Create() {
   builder = DeltaMesh::Create(SimplexDimension(mesh->spec()), oracle_.ambient_dimension(),
                               mesh->spec().boundary_only());
   if (!builder) return tl::unexpected(builder.error());
-  builder_ = std::make_unique<DeltaMesh>(std::move(*builder));
+  if (watching_ == Watching::kMesh) builder_ = std::make_unique<DeltaMesh>(std::move(*builder));
   return {};
 }
 
@@ -145,12 +147,14 @@ void Run::Cancel() {
 Expected<void> Run::WatchOnce(v1::Mesh* final, grpc::Status* status) {
   v1::WatchMeshRequest request;
   request.set_name(name_);
-  request.set_from_revision(builder_->revision());
+  request.set_progress_only(builder_ == nullptr);
+  if (builder_ != nullptr) request.set_from_revision(builder_->revision());
   grpc::ClientContext& context = watch_->Attempt();
   const auto stream = stub_->WatchMesh(&context, request);
   v1::WatchMeshResponse response;
   while (stream->Read(&response)) {
     watch_->Heard();
+    if (builder_ == nullptr && !response.has_progress() && !response.has_final()) continue;
     if (response.has_delta()) {
       if (auto ok = builder_->Absorb(std::move(*response.mutable_delta())); !ok) {
         context.TryCancel();
@@ -171,7 +175,7 @@ Expected<void> Run::WatchOnce(v1::Mesh* final, grpc::Status* status) {
     }
   }
   *status = stream->Finish();
-  builder_->ForgetPending();
+  if (builder_ != nullptr) builder_->ForgetPending();
   return {};
 }
 
@@ -200,6 +204,11 @@ Error Run::LostFor(const grpc::Status& status) const {
 
 Expected<Mesh> Run::Conclude(const v1::Mesh& final) {
   if (final.state() == v1::MESH_STATE_FAILED) return tl::unexpected(WhyFailed(final));
+  if (builder_ == nullptr) {
+    Mesh reported;
+    reported.report = ReportOf(final);
+    return reported;
+  }
   Expected<Mesh> mesh = builder_->Take();
   if (!mesh) return mesh;
   mesh->report = ReportOf(final);
@@ -213,6 +222,16 @@ Expected<Mesh> Run::Conclude(const v1::Mesh& final) {
         std::to_string(mesh->points.cols()) + " and " + std::to_string(mesh->simplices.cols())));
   }
   return mesh;
+}
+
+Expected<SavedMesh> Run::SaveTo(const std::vector<std::string>& paths) const {
+  DownloadOptions options;
+  options.connection = options_.connection;
+  options.unfinished = Unfinished::kWait;  // it is over, but may be being put down still
+  options.on_part = options_.on_part;
+  if (!options_.stop.stop_requested())
+    options.stop = options_.stop;  // else that has ended the mesh
+  return DownloadTo(channel_, name_, paths, options);
 }
 
 }  // namespace stellate::client

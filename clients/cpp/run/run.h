@@ -21,13 +21,17 @@ namespace stellate::client {
 // on: the watch from the last revision that it has, the workers with whatever is asked next.
 class Run {
  public:
+  enum class Watching { kMesh, kProgress };
   // `hopeless`: whether a lost server will not come back.
   Run(const std::shared_ptr<grpc::Channel>& channel, Oracle& oracle, const MeshOptions& options,
-      std::function<bool()> hopeless);
+      std::function<bool()> hopeless, Watching watching = Watching::kMesh);
   // Whatever happens the mesh is gone from the server, and no thread is left in the oracle.
   ~Run();
 
+  // Of kProgress the report alone.
   Expected<Mesh> Go();
+  // Fetches the mesh, which Go has seen the end of, into files.
+  Expected<SavedMesh> SaveTo(const std::vector<std::string>& paths) const;
 
  private:
   Expected<void> Create();
@@ -46,8 +50,9 @@ class Run {
   Oracle& oracle_;
   const MeshOptions& options_;
   const std::function<bool()> hopeless_;
+  const Watching watching_;
   std::string name_;
-  std::unique_ptr<DeltaMesh> builder_;
+  std::unique_ptr<DeltaMesh> builder_;  // of kMesh
   std::unique_ptr<Reconnector> watch_;
   bool ended_ = false;  // the server said how
   std::vector<std::unique_ptr<Worker>> workers_;

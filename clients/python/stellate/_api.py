@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, Union, overload
 
 from ._checkpoint import Checkpoint
 from ._credentials import Credentials
-from ._download import OnPart, Unfinished, fetch
+from ._download import OnPart, Unfinished, fetch, fetch_to
 from ._epsilon import Epsilon
 from ._files.formats import check_save
 from ._findings import CheckReport
@@ -18,6 +18,7 @@ from ._follow import Following, OnProgress
 from ._interrupt import Interrupts, told
 from ._mesh import FinishedMesh, Mesh
 from ._run import Run
+from ._saved import SavedMesh
 from .client import Client
 from .errors import InvalidArgument, NotCertified, SaveError, protocol_error
 from .options import MeshOptions, takes
@@ -121,7 +122,7 @@ def mesh(
       checkpoint, and is Interrupted, a KeyboardInterrupt with the mesh so far; a second Ctrl-C does
       not wait for that.
     """
-    files = [save] if isinstance(save, (str, os.PathLike)) else list(save)
+    files = _files(save)
     if keep_on_server and server is None:
         raise InvalidArgument(
             "keep_on_server is for a server that is named: a private one ends with the call. To keep the "
@@ -242,6 +243,21 @@ def download(
 @overload
 def download(
     mesh_name: str,
+    path: None = None,
+    *,
+    to: Path | Sequence[Path],
+    server: str | Server | Client,
+    unfinished: Unfinished = "refuse",
+    revision: int = 0,
+    on_progress: OnProgress | None = None,
+    on_part: OnPart | None = None,
+    credentials: Credentials | None = None,
+) -> SavedMesh: ...
+
+
+@overload
+def download(
+    mesh_name: str,
     path: Path | None = None,
     *,
     server: str | Server | Client,
@@ -257,19 +273,25 @@ def download(
     mesh_name: str,
     path: Path | None = None,
     *,
+    to: Path | Sequence[Path] = (),
     server: str | Server | Client,
     unfinished: Unfinished = "refuse",
     revision: int = 0,
     on_progress: OnProgress | None = None,
     on_part: OnPart | None = None,
     credentials: Credentials | None = None,
-) -> Mesh:
+) -> Mesh | SavedMesh:
     """Fetches a mesh that is on a server; it stays there. A broken stream is resumed.
 
     Args:
       mesh_name: "meshes/<id>", as Client.create and Client.list give it.
       path: where to write it as well, as Mesh.save does. What its format cannot hold is an error
         before anything is waited for or fetched.
+      to: a file or several that the mesh goes into as it comes, so that it takes little memory however
+        large it is: the same bytes as by `path`, under that name when they are whole. Still fetched
+        whole are a mesh that did not succeed or is not over, and what a format needs whole: .stl
+        .3mf .glb .npz and what meshio writes; .msh, .vtu and .obj of manifolds with boundary; the surfaces of solids;
+        pipes.
       server: "host:port", "unix:/path", a stellate.Server or Client.
       unfinished: what to do about a mesh that is not over: "refuse" it, "wait" for its end, however
         long that takes, or "take" it as it is now; "take" fetches what there is of a failed or
@@ -281,13 +303,19 @@ def download(
       credentials: as for stellate.mesh.
 
     Returns:
-      The mesh: a FinishedMesh if it is the last revision of one that is over.
+      The mesh: a FinishedMesh if it is the last revision of one that is over. With `to` a SavedMesh,
+      whose `points` and `cells` are mapped from the .vtu file.
 
     Raises:
       MeshNotFound; FailedPrecondition for a mesh that is refused because it is not over; how the
       mesh failed, or Cancelled, with what there is of it in the exception's `mesh`; Unavailable.
     """
     with _client(server, credentials) as client, told(f"{mesh_name} is left on its server"):
+        files = _files(to)
+        if files:
+            if path is not None:
+                raise TypeError("download() takes either path or to")
+            return fetch_to(client, mesh_name, files, revision, unfinished, on_progress, on_part)
         mesh = fetch(client, mesh_name, revision, unfinished, on_progress, on_part, path)
     asked_for_last = revision == 0 and unfinished != "take"
     if asked_for_last and not isinstance(mesh, FinishedMesh):
@@ -295,6 +323,10 @@ def download(
     if path is not None:
         mesh.save(path)
     return mesh
+
+
+def _files(paths: Path | Sequence[Path]) -> list[Path]:
+    return [paths] if isinstance(paths, (str, os.PathLike)) else list(paths)
 
 
 def _client(

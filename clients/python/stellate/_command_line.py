@@ -28,9 +28,9 @@ from ._command_oracle import CommandOracle
 from ._complex import Complex
 from ._credentials import Credentials
 from ._download import Unfinished
-from ._files.formats import check_save
 from ._oracle_source import Refused, add_oracle, name_of, oracle_of
 from ._reconnect import WAITS
+from ._saved import SavedMesh
 from ._version import __version__
 from .client import Client
 from .errors import Interrupted, StellateError, exit_status
@@ -129,7 +129,7 @@ def _say_nothing(progress: Progress) -> None:
     """An `on_progress`: with none at all, a mesh that takes long says so."""
 
 
-def _deliver(finished: Complex, options: argparse.Namespace) -> int:
+def _deliver(finished: Complex | SavedMesh, options: argparse.Namespace) -> int:
     """What a mesh is told by; the exit status that stands for it."""
     report = finished.report
     if options.report is not None and report is not None:
@@ -208,17 +208,11 @@ def _serve(options: argparse.Namespace) -> int:
 def _download(options: argparse.Namespace) -> int:
     unfinished: Unfinished
     unfinished = "wait" if options.wait else "take" if options.unfinished else "refuse"
-    first, *others = options.output
     with _connected(options) as client:
-        info = client.get(options.mesh)
-        for path in others:
-            check_save(path, info.dimension, info.ambient_dimension)
         finished = download(
-            options.mesh, first, server=client, unfinished=unfinished, revision=options.revision,
-            on_progress=_bar(options),
+            options.mesh, to=options.output, server=client, unfinished=unfinished,
+            revision=options.revision, on_progress=_bar(options),
         )  # fmt: skip
-    for path in others:
-        finished.save(path)
     return _deliver(finished, options)
 
 

@@ -328,11 +328,7 @@ class Mesh:
         Warns: UncertifiedWarning for a mesh whose report says that it is not certified.
         """
         if self.report is not None and not self.report.certified:
-            warnings.warn(
-                f"{os.fspath(path)} gets a mesh that is NOT CERTIFIED: {self.report.what_failed}",
-                UncertifiedWarning,
-                stacklevel=2,
-            )
+            warn_of_uncertified(os.fspath(path), self.report, stacklevel=3)
         formats.save(self, os.fspath(path))
 
     def slice(self, normal: Any, level: float = 0.0) -> Mesh:
@@ -473,6 +469,15 @@ class FinishedMesh(Mesh):
     """A mesh that has come to its end, certified or not: its `report` says which."""
 
     report: Report = dataclasses.field()
+
+
+def warn_of_uncertified(path: str, report: Report, stacklevel: int) -> None:
+    """Of a file that gets such a mesh."""
+    warnings.warn(
+        f"{path} gets a mesh that is NOT CERTIFIED: {report.what_failed}",
+        UncertifiedWarning,
+        stacklevel=stacklevel,
+    )
 
 
 def with_report(mesh: Mesh, report: Report | None) -> Mesh:

@@ -19,6 +19,7 @@ from ._generated import stellate_pb2_grpc as rpc
 from ._info import MeshInfo, ServerInfo
 from ._points import CheckedPoints
 from ._reconnect import WAITS, Reconnector, ReconnectPolicy
+from ._saved import SavedMesh
 from ._streams import Parts, Watch
 from ._upload import Upload
 from ._wire.spec import mesh_spec
@@ -31,7 +32,7 @@ from .server import Server
 if TYPE_CHECKING:
     from typing_extensions import Unpack
 
-__all__ = ["Client", "MeshInfo", "ServerInfo", "Watch", "Parts"]
+__all__ = ["Client", "MeshInfo", "SavedMesh", "ServerInfo", "Watch", "Parts"]
 
 _NO_PINGS = 1_000_000.0
 _LARGEST_MESSAGE = 64 << 20

@@ -144,12 +144,8 @@ TEST_F(MeshFile, PlyHoldsFaces) {
   ExpectEdgesCancel(LinesAfter(text, "3 "));
 }
 
-// The numbers of a VTU data array: base64 of the byte count and the bytes.
-template <typename Number>
-std::vector<Number> VtuNumbers(const std::string& xml, const std::string& name) {
-  const size_t array = xml.find("Name=\"" + name + "\"");
-  EXPECT_NE(array, std::string::npos) << name;
-  if (array == std::string::npos) return {};
+// The byte count and the bytes of a VTU data array that is inline, from base64.
+std::string InlineBytes(const std::string& xml, size_t array) {
   const size_t start = xml.find('>', array) + 1;
   std::string bytes;
   std::uint32_t bits = 0;
@@ -168,9 +164,31 @@ std::vector<Number> VtuNumbers(const std::string& xml, const std::string& name) 
       bytes += static_cast<char>(bits >> held & 0xff);
     }
   }
+  return bytes;
+}
+
+// The same, raw, of one that is among the appended data, with what follows it.
+std::string AppendedBytes(const std::string& xml, const std::string& tag, size_t unit) {
+  const size_t data = xml.find('_', xml.find("<AppendedData encoding=\"raw\">")) + 1;
+  const std::string offset = "offset=\"";
+  const size_t place = std::stoul(tag.substr(tag.find(offset) + offset.size()));
+  EXPECT_EQ((data + place) % unit, 0u) << "can be mapped into memory: " << tag;
+  return xml.substr(data + place);
+}
+
+// The numbers of a VTU data array.
+template <typename Number>
+std::vector<Number> VtuNumbers(const std::string& xml, const std::string& name) {
+  const size_t array = xml.find("Name=\"" + name + "\"");
+  EXPECT_NE(array, std::string::npos) << name;
+  if (array == std::string::npos) return {};
+  const std::string tag = xml.substr(array, xml.find('>', array) - array);
+  const std::string bytes = tag.find("\"appended\"") == std::string::npos
+                                ? InlineBytes(xml, array)
+                                : AppendedBytes(xml, tag, sizeof(Number));
   std::uint64_t size = 0;
   std::memcpy(&size, bytes.data(), sizeof size);
-  EXPECT_EQ(bytes.size(), sizeof size + size);
+  EXPECT_GE(bytes.size(), sizeof size + size);
   std::vector<Number> numbers(size / sizeof(Number));
   std::memcpy(numbers.data(), bytes.data() + sizeof size, size);
   return numbers;

@@ -10,6 +10,7 @@
 
 #include "stellate/connection.h"
 #include "stellate/doctor.h"
+#include "stellate/download.h"
 #include "stellate/error.h"
 #include "stellate/mesh.h"
 #include "stellate/oracle.h"
@@ -38,6 +39,8 @@ struct MeshOptions {
   std::optional<std::uint32_t> max_chunk;
   // Called on the calling thread. An exception from it cancels the mesh and reaches the caller.
   std::function<void(const Progress&)> on_progress;
+  // Of MeshManifoldTo: see DownloadOptions.
+  std::function<void(std::uint64_t received, std::uint64_t all)> on_part;
   // Cancels the mesh when stop is requested; the mesh so far is returned, not certified.
   std::stop_token stop;
 
@@ -89,6 +92,10 @@ struct MeshOptions {
 // rule. An exception from the oracle reaches the caller unchanged, and the server as a failed
 // oracle.
 Expected<Mesh> MeshManifold(Oracle& oracle, const MeshOptions& options);
+
+// The same into files, as DownloadMeshTo writes them once the mesh is over: it is never held here.
+Expected<SavedMesh> MeshManifoldTo(Oracle& oracle, const std::vector<std::string>& paths,
+                                   const MeshOptions& options);
 
 struct ServerHealth {
   bool serving = false;

@@ -4,6 +4,7 @@
 #include <functional>
 #include <stop_token>
 #include <string>
+#include <vector>
 
 #include "stellate/connection.h"
 #include "stellate/error.h"
@@ -24,9 +25,6 @@ struct DownloadOptions {
   // Any revision that the mesh has had, however it ended; 0: the newest. Only the last revision of
   // a mesh that is over has a report.
   std::uint64_t revision = 0;
-  // Called with the mesh's dimensions before any wait or transfer. An error that it returns ends
-  // the download.
-  std::function<Expected<void>(int dimension, int ambient_dimension)> on_found;
   // Called on the calling thread: on_progress during the wait, and on_part at each part, with the
   // vertices and simplices received and those of the whole mesh.
   std::function<void(const Progress&)> on_progress;
@@ -40,5 +38,22 @@ struct DownloadOptions {
 // Returns an error if there is no such mesh, if it failed (with its reason; kTake fetches what it
 // has), or if the server is lost.
 Expected<Mesh> DownloadMesh(const std::string& name, const DownloadOptions& options);
+
+// A mesh that is in files, and not in memory.
+struct SavedMesh {
+  int dimension = 0, ambient_dimension = 0;
+  std::uint64_t vertices = 0, simplices = 0;
+  Report report;
+  // Of files that could not be written, kFileFailed; the others are there. Not all failed.
+  std::vector<Error> failures;
+};
+
+// As DownloadMesh and Mesh::Save to each path, byte for byte, in little memory however large the
+// mesh is: parts go into the files as they come, which take their places when they are whole. Still
+// held whole are a mesh that is not over or that no server could orient, and what a format needs
+// whole: .stl; .msh, .vtu and .obj of manifolds with boundary; .off, .obj and .ply of solids;
+// pipes. An error leaves no file behind.
+Expected<SavedMesh> DownloadMeshTo(const std::string& name, const std::vector<std::string>& paths,
+                                   const DownloadOptions& options);
 
 }  // namespace stellate

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import contextlib
 import dataclasses
+import enum
 import importlib.util
-import itertools
 import os
-import secrets
-import stat
 from collections.abc import Iterator
-from typing import Callable
+from typing import BinaryIO, Callable
 
 import numpy as np
 
-from .._complex import Complex, in_space
+from .._complex import Complex
 from ..errors import SaveError
-from . import glb, meshio_formats, npz, three_mf, vtu
-from .groups import Group, groups
+from . import glb, layouts, meshio_formats, npz, three_mf
+from .groups import Group, groups, label_data
 from .surface import boundary, drawn
+from .vtu import VtuWriter
+from .writing import Cells, MeshWriter, Shape, TextLayout, TextWriter, is_special, replaced
 
 _ANY = 1 << 30
 _DEBIAN = {"meshio": "python3-meshio", "h5py": "python3-h5py", "netCDF4": "python3-netcdf4"}
@@ -34,7 +34,7 @@ def check_save(path: str | os.PathLike[str], dimension: int, ambient_dimension: 
     _choose(path, dimension, ambient_dimension)
     if os.path.isdir(path):
         raise IsADirectoryError(f"{path} is a folder")
-    place = path if _is_special(path) else os.path.dirname(os.path.realpath(path))
+    place = path if is_special(path) else os.path.dirname(os.path.realpath(path))
     if not os.path.exists(place):
         raise FileNotFoundError(f"cannot write {path}: there is no folder {place}")
     if not os.access(place, os.W_OK):
@@ -44,38 +44,81 @@ def check_save(path: str | os.PathLike[str], dimension: int, ambient_dimension: 
 def save(mesh: Complex, path: str) -> None:
     """Mesh.save."""
     form = _choose(path, mesh.dimension, mesh.ambient_dimension)
-    if form.meshio is not None:
-        with contextlib.ExitStack() as stack:
-            beside = None
-            if form.meshio.facets and mesh.faces(mesh.dimension - 1) and not _is_special(path):
-                root, ending = os.path.splitext(path)
-                beside = stack.enter_context(_replaced(f"{root}_facets{ending}"))
-            draft = stack.enter_context(_replaced(path))
+    with contextlib.ExitStack() as stack:
+        beside = None
+        pairs = form.meshio is not None and form.meshio.facets
+        if pairs and mesh.faces(mesh.dimension - 1) and not is_special(path):
+            root, ending = os.path.splitext(path)
+            beside = stack.enter_context(replaced(f"{root}_facets{ending}"))
+        draft = stack.enter_context(replaced(path))
+        if form.meshio is not None:
             meshio_formats.write(form.meshio, mesh, cells(mesh), draft, beside)
-        return
-    _write(form.contents(mesh), path)
+        else:
+            form.write(mesh, draft)
 
 
 def save_txt(mesh: Complex, path: str) -> None:
     """The .txt format, whatever the path ends in."""
-    _write(_FORMATS[".txt"].contents(mesh), path)
+    with replaced(path) as draft:
+        _FORMATS[".txt"].write(mesh, draft)
 
 
-def _write(contents: bytes, path: str) -> None:
-    """Takes contents that are whole before any file is touched."""
-    with _replaced(path) as draft, open(draft, "wb") as file:
-        file.write(contents)
+def can_stream(path: str, k: int, d: int, has_walls: bool) -> bool:
+    """Whether a mesh of these dimensions can be written to the path in the order in which it comes.
+
+    Not what a format groups by walls and labels, what it draws of a solid, .stl and others that are
+    written whole, what meshio writes, and pipes, which cannot be taken back.
+    """
+    form = _choose(path, k, d)
+    if not form.streams or is_special(path):
+        return False
+    if form.holds is Holds.ROWS:
+        return True
+    if k == 3 and form.holds is not Holds.GROUPS:
+        return False  # it is drawn
+    return form.holds is Holds.DRAWN or not has_walls
+
+
+@dataclasses.dataclass(frozen=True)
+class StreamedFile:
+    """A file that can_stream takes, on its way; `is_turned`: cells are to be turned to agree."""
+
+    writer: MeshWriter
+    is_turned: bool
+
+
+@contextlib.contextmanager
+def streamed_file(path: str, shape: Shape) -> Iterator[StreamedFile]:
+    """A file of one group, which is put in its place if all goes well."""
+    form = _choose(path, shape.dimension, shape.ambient_dimension)
+    with replaced(path) as draft, open(draft, "wb") as file:
+        writer = form.writer(file, shape)
+        yield StreamedFile(writer, form.holds is not Holds.ROWS)
+        writer.finish()
+
+
+class Holds(enum.Enum):
+    """What a format holds of a mesh."""
+
+    ROWS = "the simplices as they are"
+    DRAWN = "turned to agree; of a solid its surface"
+    POLYGONS = "turned to agree, group by group; of a solid its boundary"
+    GROUPS = "turned to agree, group by group"
 
 
 @dataclasses.dataclass(frozen=True)
 class _Format:
-    """What a file format can hold, and who writes it: we, or meshio."""
+    """What a file format can hold, and who writes it: we, by a layout of text, as .vtu or whole, or
+    meshio."""
 
     least_dimension: int
     largest_dimension: int
     largest_ambient_dimension: int
-    holds: str
-    contents: Callable[[Complex], bytes] = lambda mesh: b""
+    words: str
+    holds: Holds = Holds.GROUPS
+    layout: Callable[[Shape], TextLayout] | None = None
+    is_vtu: bool = False
+    contents: Callable[[Complex], bytes] | None = None
     meshio: meshio_formats.MeshioFormat | None = None
     surface_of_solids: bool = False  # in space, besides what it holds
 
@@ -84,6 +127,75 @@ class _Format:
             self.least_dimension <= k <= self.largest_dimension
             and d <= self.largest_ambient_dimension
         )
+
+    @property
+    def streams(self) -> bool:
+        """Whether points and cells of one group are written in the order in which they come."""
+        return self.is_vtu or self.layout is not None
+
+    def writer(self, file: BinaryIO, shape: Shape, mesh: Complex | None = None) -> MeshWriter:
+        """`mesh`: of a file that has more than points and simplices, which they then are whole."""
+        if self.layout is not None:
+            return TextWriter(file, self.layout(shape))
+        if mesh is None:
+            return VtuWriter(file, shape)
+        return VtuWriter(file, shape, mesh.walls, _cell_data(mesh))
+
+    def write(self, mesh: Complex, path: str) -> None:
+        if self.contents is not None:
+            contents = self.contents(mesh)  # whole before the file is touched
+            with open(path, "wb") as file:
+                file.write(contents)
+            return
+        points, every = self._contents(mesh)
+        shape = Shape(
+            mesh.dimension,
+            mesh.ambient_dimension,
+            len(points),
+            tuple(Cells(it.dimension, len(it.simplices), it.tag, it.name) for it in every),
+            mesh.report,
+        )
+        with open(path, "wb") as file:
+            writer = self.writer(file, shape, mesh)
+            writer.add_points(points)
+            for number, group in enumerate(every):
+                writer.add_cells(number, group.simplices)
+            writer.finish()
+
+    def _contents(self, mesh: Complex) -> tuple[np.ndarray, list[Group]]:
+        """The points and the cells that it holds."""
+        if self.holds is Holds.ROWS:
+            return mesh.points, [Group(1, "", (), mesh.simplices)]
+        rows = cells(mesh)
+        if self.holds is Holds.DRAWN:
+            points = mesh.points
+            if mesh.dimension == 3:
+                points, rows = drawn(mesh, rows)
+            return points, [Group(1, "", (), rows)]
+        every = groups(mesh, rows)
+        if self.holds is Holds.GROUPS:
+            return mesh.points, every
+        if len(every) == 1:  # it is not known on what walls a solid ends
+            rows = boundary(rows) if mesh.dimension == 3 else rows
+            return mesh.points, [Group(1, "", (), rows)]
+        return mesh.points, [group for group in every if group.dimension < 3]
+
+
+def _cell_data(mesh: Complex) -> dict[str, np.ndarray]:
+    """Of a mesh of several groups or with labels, what its cells have in .vtu."""
+    every = groups(mesh, cells(mesh))
+    if len(every) == 1 and mesh.labels is None:
+        return {}
+    counts = [len(group.simplices) for group in every]
+    bits = np.array([group.bits for group in every], dtype=np.uint64)
+    tags = np.array([group.tag for group in every], dtype=np.int32)
+    data: dict[str, np.ndarray] = {
+        "walls": np.repeat(bits, counts),
+        "group": np.repeat(tags, counts),
+    }
+    if mesh.labels is not None:
+        data.update({name: np.concatenate(it) for name, it in label_data(every).items()})
+    return data
 
 
 def _choose(path: str, k: int, d: int) -> _Format:
@@ -98,7 +210,7 @@ def _choose(path: str, k: int, d: int) -> _Format:
     if not form.takes(k, d):
         fits = form.least_dimension <= k <= form.largest_dimension
         raise SaveError(
-            f"{ending} holds {'points of space' if fits else form.holds}, and {path} would get a "
+            f"{ending} holds {'points of space' if fits else form.words}, and {path} would get a "
             f"mesh of dimension {k} in R^{d}; known for it: {known}"
         )
     needed = [] if form.meshio is None else ["meshio", form.meshio.package]
@@ -111,119 +223,10 @@ def _choose(path: str, k: int, d: int) -> _Format:
     return form
 
 
-def _is_special(path: str) -> bool:
-    """A pipe or a device: written as it is, since nothing may take its place."""
-    return os.path.exists(path) and not stat.S_ISREG(os.stat(path).st_mode)
-
-
-@contextlib.contextmanager
-def _replaced(path: str) -> Iterator[str]:
-    """A file to write that takes the path's place when it is whole, and goes if it is not."""
-    if _is_special(path):
-        yield path
-        return
-    target = os.path.realpath(path)
-    root, ending = os.path.splitext(target)  # which meshio goes by
-    draft = f"{root}.part-{secrets.token_hex(4)}{ending}"
-    try:
-        yield draft
-        if os.path.exists(target):
-            os.chmod(draft, stat.S_IMODE(os.stat(target).st_mode))
-        with open(draft, "rb") as written:
-            os.fsync(written.fileno())
-        os.replace(draft, target)
-    except BaseException as error:
-        with contextlib.suppress(FileNotFoundError):
-            os.unlink(draft)
-        if isinstance(error, OSError) and error.filename == draft:
-            error.filename = path  # the one that the caller knows
-        raise
-
-
-def _lines(rows: np.ndarray, number: str, prefix: str = "") -> Iterator[str]:
-    line = prefix + " ".join([number] * rows.shape[1])
-    return (line % tuple(row) for row in rows.tolist())
-
-
 def cells(mesh: Complex) -> np.ndarray:
     """The simplices, turned to agree where that can be."""
     oriented = mesh.oriented_simplices()
     return mesh.simplices if oriented is None else oriented
-
-
-def _txt(mesh: Complex) -> Iterator[str]:
-    yield f"{mesh.dimension} {mesh.ambient_dimension} {len(mesh.points)} {len(mesh.simplices)}"
-    yield from _lines(mesh.points, "%.17g")
-    yield from _lines(mesh.simplices, "%d")
-
-
-def _off(mesh: Complex) -> Iterator[str]:
-    if mesh.ambient_dimension == 3:
-        yield "OFF"
-    else:
-        yield "nOFF"
-        yield str(mesh.ambient_dimension)
-    points, rows = mesh.points, cells(mesh)
-    if mesh.dimension == 3:
-        points, rows = drawn(mesh, rows)
-    yield f"{len(points)} {len(rows)} 0"
-    yield from _lines(points, "%.17g")
-    yield from _lines(rows, "%d", f"{rows.shape[1]} ")
-
-
-def _obj(mesh: Complex) -> Iterator[str]:
-    points = in_space(mesh.points)
-    yield from _lines(points, "%.17g", "v ")
-    every = groups(mesh, cells(mesh))
-    named = len(every) > 1
-    if mesh.dimension == 3:  # a solid is its boundary here, by its walls if they are known
-        every = every[1:] or [Group(1, "surface", (), boundary(cells(mesh)))]
-    for group in every:
-        if named:
-            yield f"g {group.name}"
-        yield from _lines(group.simplices + 1, "%d", ("p ", "l ", "f ")[group.dimension])
-
-
-def _ply(mesh: Complex) -> Iterator[str]:
-    points, rows = drawn(mesh, cells(mesh))
-    yield "ply"
-    yield "format ascii 1.0"
-    yield f"element vertex {len(points)}"
-    yield from (f"property double {axis}" for axis in "xyz")
-    if mesh.dimension == 1:
-        yield f"element edge {len(rows)}"
-        yield from ("property int vertex1", "property int vertex2")
-    else:
-        yield f"element face {len(rows)}"
-        yield "property list uchar int vertex_indices"
-    yield "end_header"
-    yield from _lines(points, "%.17g")
-    yield from _lines(rows, "%d", "" if mesh.dimension == 1 else "3 ")
-
-
-def _msh(mesh: Complex) -> Iterator[str]:
-    """Gmsh's format 2.2, which every version of it reads, and most others who read .msh."""
-    element_types = (15, 1, 2, 4)  # point, line, triangle, tetrahedron
-    every = groups(mesh, cells(mesh))
-    yield "$MeshFormat\n2.2 0 8\n$EndMeshFormat"
-    if len(every) > 1:
-        yield f"$PhysicalNames\n{len(every)}"
-        yield from (f'{group.dimension} {group.tag} "{group.name}"' for group in every)
-        yield "$EndPhysicalNames"
-    yield f"$Nodes\n{len(mesh.points)}"
-    yield from (f"{i} {line}" for i, line in enumerate(_lines(in_space(mesh.points), "%.17g"), 1))
-    yield f"$EndNodes\n$Elements\n{sum(len(group.simplices) for group in every)}"
-    # Two tags for each element: its physical group and its geometrical entity, by the same number.
-    rows = itertools.chain.from_iterable(
-        _lines(
-            group.simplices + 1,
-            "%d",
-            f"{element_types[group.dimension]} 2 {group.tag} {group.tag} ",
-        )
-        for group in every
-    )
-    yield from (f"{i} {line}" for i, line in enumerate(rows, 1))
-    yield "$EndElements"
 
 
 _STL_FACET = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attributes", "<u2")])
@@ -248,10 +251,6 @@ def _stl(mesh: Complex) -> bytes:
     return b" " * 80 + np.uint32(len(facets)).astype("<u4").tobytes() + facets.tobytes()
 
 
-def _vtu_lines(mesh: Complex) -> Iterator[str]:
-    return vtu.lines(mesh, cells(mesh))
-
-
 def _three_mf(mesh: Complex) -> bytes:
     return three_mf.contents(mesh, cells(mesh))
 
@@ -260,25 +259,27 @@ def _glb(mesh: Complex) -> bytes:
     return glb.contents(mesh, cells(mesh))
 
 
-def _text(lines: Callable[[Complex], Iterator[str]]) -> Callable[[Complex], bytes]:
-    return lambda mesh: ("\n".join(lines(mesh)) + "\n").encode()
-
-
 _LOW = "curves and surfaces"
 _SOLIDS = "and the surfaces of solids in space"
 _CELLULAR = "simplices of dimension 3 at most"
 
 _FORMATS = {
-    ".txt": _Format(0, _ANY, _ANY, "anything", _text(_txt)),
-    ".off": _Format(1, 2, _ANY, f"{_LOW}, {_SOLIDS}", _text(_off), surface_of_solids=True),
-    ".obj": _Format(1, 2, 3, f"{_LOW}, {_SOLIDS}", _text(_obj), surface_of_solids=True),
-    ".ply": _Format(1, 2, 3, f"{_LOW}, {_SOLIDS}", _text(_ply), surface_of_solids=True),
-    ".stl": _Format(2, 2, 3, f"surfaces, {_SOLIDS}", _stl, surface_of_solids=True),
-    ".3mf": _Format(2, 2, 3, f"surfaces, {_SOLIDS}", _three_mf, surface_of_solids=True),
-    ".glb": _Format(2, 2, 3, f"surfaces, {_SOLIDS}", _glb, surface_of_solids=True),
-    ".msh": _Format(1, 3, 3, _CELLULAR, _text(_msh)),
-    ".vtu": _Format(1, 3, _ANY, _CELLULAR, _text(_vtu_lines)),
-    ".npz": _Format(0, _ANY, _ANY, "anything", npz.contents),
+    ".txt": _Format(0, _ANY, _ANY, "anything", Holds.ROWS, layouts.txt),
+    ".off": _Format(
+        1, 2, _ANY, f"{_LOW}, {_SOLIDS}", Holds.DRAWN, layouts.off, surface_of_solids=True
+    ),
+    ".obj": _Format(
+        1, 2, 3, f"{_LOW}, {_SOLIDS}", Holds.POLYGONS, layouts.obj, surface_of_solids=True
+    ),
+    ".ply": _Format(
+        1, 2, 3, f"{_LOW}, {_SOLIDS}", Holds.DRAWN, layouts.ply, surface_of_solids=True
+    ),
+    ".stl": _Format(2, 2, 3, f"surfaces, {_SOLIDS}", contents=_stl, surface_of_solids=True),
+    ".3mf": _Format(2, 2, 3, f"surfaces, {_SOLIDS}", contents=_three_mf, surface_of_solids=True),
+    ".glb": _Format(2, 2, 3, f"surfaces, {_SOLIDS}", contents=_glb, surface_of_solids=True),
+    ".msh": _Format(1, 3, 3, _CELLULAR, layout=layouts.msh),
+    ".vtu": _Format(1, 3, _ANY, _CELLULAR, is_vtu=True),
+    ".npz": _Format(0, _ANY, _ANY, "anything", contents=npz.contents),
     **{
         ending: _Format(
             form.least_dimension,

@@ -1,85 +1,179 @@
-"""VTK's XML files of unstructured grids."""
+"""VTK's XML files of unstructured grids, with raw appended data."""
 
 from __future__ import annotations
 
 import base64
-import zlib
-from collections.abc import Iterator
+import dataclasses
+import re
+from collections.abc import Mapping
+from typing import BinaryIO
 
 import numpy as np
 
-from .._complex import Complex, in_space
+from .._complex import in_space
 from .._version import __version__
-from .groups import Group, groups, label_data
+from .writing import Shape
 
 _TYPES = {
     "<f8": "Float64",
     "<i8": "Int64",
     "<i4": "Int32",
     "<u8": "UInt64",
-    "<u4": "UInt32",
     "|u1": "UInt8",
 }
 CELL_TYPES = {0: 1, 1: 3, 2: 5, 3: 10}  # vertex, line, triangle, tetrahedron
-_BLOCK_BYTES = 1 << 20
+_ROWS = 1 << 16  # at a time, of what is not given in blocks
 
 DIMENSIONS = (1, 2, 3)
 
 
-def lines(mesh: Complex, cells: np.ndarray) -> Iterator[str]:
-    """The file of a mesh with these oriented cells, k in DIMENSIONS."""
-    n, d = mesh.points.shape
-    every = groups(mesh, cells)
-    counts = [len(group.simplices) for group in every]
-    widths = np.repeat([group.dimension + 1 for group in every], counts)
-    kinds = [CELL_TYPES[group.dimension] for group in every]
-    yield '<?xml version="1.0"?>'
-    yield (
-        '<VTKFile type="UnstructuredGrid" version="1.0" byte_order="LittleEndian" '
-        'header_type="UInt64" compressor="vtkZLibDataCompressor">'
-    )
-    yield "<UnstructuredGrid>"
-    yield "<FieldData>"
-    for name, values in field_data(mesh, every).items():
-        yield _array(name, values, f'NumberOfTuples="{len(values)}"')
-    yield "</FieldData>"
-    yield f'<Piece NumberOfPoints="{n}" NumberOfCells="{sum(counts)}">'
-    yield "<Points>"
-    yield _array("Points", in_space(mesh.points))
-    yield "</Points>"
-    yield "<Cells>"
-    yield _array("connectivity", np.concatenate([group.simplices.ravel() for group in every]))
-    yield _array("offsets", np.cumsum(widths))
-    yield _array("types", np.repeat(np.array(kinds, dtype=np.uint8), counts))
-    yield "</Cells>"
-    if d > 3 or mesh.walls is not None:
-        yield "<PointData>"
+@dataclasses.dataclass
+class _Array:
+    """An appended array, and where it is in the file."""
+
+    kind: str
+    name: str
+    components: int
+    rows: int
+    section: str
+    place: int = 0  # in the appended data, of the byte count before it
+    written: int = -1  # without that; -1: nor that
+
+    @property
+    def size(self) -> int:
+        return self.rows * self.components * np.dtype(self.kind).itemsize
+
+    def tag(self) -> str:
+        return (
+            f'<DataArray type="{_TYPES[self.kind]}" Name="{self.name}" '
+            f'NumberOfComponents="{self.components}" format="appended" offset="{self.place}"/>\n'
+        )
+
+
+class VtuWriter:
+    """A MeshWriter. Wider numbers come first in the file: each number begins at a multiple of its size,
+    so that a file can be mapped into memory."""
+
+    def __init__(
+        self,
+        file: BinaryIO,
+        shape: Shape,
+        walls: np.ndarray | None = None,
+        cell_data: Mapping[str, np.ndarray] | None = None,
+    ) -> None:
+        """walls, cell_data: of a mesh that has some, whole; "walls", "group", "region", "sides"."""
+        self._file, self._shape = file, shape
+        self._walls, self._cell_data = walls, cell_data or {}
+        n, m, d = shape.vertices, shape.simplices, shape.ambient_dimension
+        ids = sum(group.count * (group.dimension + 1) for group in shape.groups)
+        every = {"points": _Array("<f8", "Points", 3, n, "Points")}
         if d > 3:
-            yield _array("coordinates", mesh.points)
-        if mesh.walls is not None:
-            yield _array("walls", mesh.walls)
-        yield "</PointData>"
-    if len(every) > 1 or mesh.labels is not None:
-        bits = np.array([group.bits for group in every], dtype=np.uint64)
-        tags = np.array([group.tag for group in every], dtype=np.int32)
-        yield "<CellData>"
-        yield _array("group", np.repeat(tags, counts))
-        yield _array("walls", np.repeat(bits, counts))
-        if mesh.labels is not None:
-            for name, parts in label_data(every).items():
-                yield _array(name, np.concatenate(parts))
-        yield "</CellData>"
-    yield "</Piece>"
-    yield "</UnstructuredGrid>"
-    yield "</VTKFile>"
+            every["coordinates"] = _Array("<f8", "coordinates", d, n, "PointData")
+        if walls is not None:
+            every["point walls"] = _Array("<u8", "walls", 1, n, "PointData")
+        every["connectivity"] = _Array("<i8", "connectivity", 1, ids, "Cells")
+        every["offsets"] = _Array("<i8", "offsets", 1, m, "Cells")
+        for name, kind, components in (
+            ("walls", "<u8", 1),
+            ("group", "<i4", 1),
+            ("region", "<i4", 1),
+            ("sides", "<i4", 2),
+        ):
+            if name in self._cell_data:
+                every[name] = _Array(kind, name, components, m, "CellData")
+        every["types"] = _Array("|u1", "types", 1, m, "Cells")
+        place = 0
+        for array in every.values():
+            array.place = place
+            place += 8 + array.size
+        self._arrays = every
+        head = self._head().encode()
+        self._data, self._end = len(head), 0  # where appended data begin, and what is written
+        self._put(0, head)
+
+    def _head(self) -> str:
+        shape = self._shape
+        fields = "".join(_field(name, values) for name, values in _field_data(shape).items())
+        head = (
+            '<?xml version="1.0"?>\n<VTKFile type="UnstructuredGrid" version="1.0" '
+            'byte_order="LittleEndian" header_type="UInt64">\n<UnstructuredGrid>\n'
+            f"<FieldData>\n{fields}</FieldData>\n"
+            f'<Piece NumberOfPoints="{shape.vertices}" NumberOfCells="{shape.simplices}">\n'
+        )
+        for section in ("Points", "Cells", "PointData", "CellData"):
+            inside = [array for array in self._arrays.values() if array.section == section]
+            if section == "CellData":  # by the order of their numbers' sizes in the file alone
+                inside.sort(key=lambda array: array.name != "group")
+            if inside:
+                tags = "".join(array.tag() for array in inside)
+                head += f"<{section}>\n{tags}</{section}>\n"
+        head += '</Piece>\n</UnstructuredGrid>\n<AppendedData encoding="raw">\n'
+        return head + " " * (-(len(head.encode()) + 1) % 8) + "_"
+
+    def _put(self, place: int, data: bytes) -> None:
+        if place != self._end:  # which pipes cannot do
+            self._file.seek(place)
+        self._file.write(data)
+        self._end = place + len(data)
+
+    def _append(self, name: str, values: np.ndarray) -> None:
+        array = self._arrays[name]
+        begin = self._data + array.place
+        if array.written < 0:
+            self._put(begin, np.uint64(array.size).astype("<u8").tobytes())
+            array.written = 0
+        data = np.ascontiguousarray(values, dtype=array.kind).tobytes()
+        self._put(begin + 8 + array.written, data)
+        array.written += len(data)
+
+    def add_points(self, points: np.ndarray) -> None:
+        self._append("points", in_space(points))
+        if "coordinates" in self._arrays:
+            self._append("coordinates", points)
+
+    def _add_walls(self) -> None:
+        if self._walls is not None:
+            self._append("point walls", self._walls)
+            self._walls = None
+
+    def add_cells(self, group: int, cells: np.ndarray) -> None:
+        self._add_walls()
+        for first in range(0, len(cells), _ROWS):
+            self._append("connectivity", cells[first : first + _ROWS])
+
+    def finish(self) -> None:
+        nothing = np.empty(0)
+        for name in ("points", "coordinates"):
+            if name in self._arrays:
+                self._append(name, nothing)  # where there was none
+        self._add_walls()
+        self._append("connectivity", nothing)
+        last = 0
+        self._append("offsets", nothing)
+        for group in self._shape.groups:
+            for first in range(0, group.count, _ROWS):
+                count = min(_ROWS, group.count - first)
+                ends = last + (group.dimension + 1) * np.arange(1, count + 1)
+                self._append("offsets", ends)
+                last = int(ends[-1])
+        for name in ("walls", "group", "region", "sides"):
+            if name in self._arrays:
+                self._append(name, self._cell_data[name])
+        self._append("types", nothing)
+        for group in self._shape.groups:
+            for first in range(0, group.count, _ROWS):
+                count = min(_ROWS, group.count - first)
+                self._append("types", np.full(count, CELL_TYPES[group.dimension], dtype=np.uint8))
+        types = self._arrays["types"]
+        self._put(self._data + types.place + 8 + types.size, b"\n</AppendedData>\n</VTKFile>\n")
 
 
-def field_data(mesh: Complex, every: list[Group]) -> dict[str, np.ndarray]:
+def _field_data(shape: Shape) -> dict[str, np.ndarray]:
     """What a file says of the whole mesh. Text is UTF-8: bytes are what every reader takes."""
-    report = mesh.report
+    report = shape.report
     data = {"version": _text(f"stellate {__version__}")}
-    if len(every) > 1:
-        data["groups"] = _text("".join(f"{group.name}\n" for group in every))
+    if len(shape.groups) > 1:
+        data["groups"] = _text("".join(f"{group.name}\n" for group in shape.groups))
     if report is not None:
         data["certified"] = np.array([report.certified], dtype=np.uint8)
         data["verdict"] = _text(report.certificate.verdict)
@@ -92,16 +186,38 @@ def _text(text: str) -> np.ndarray:
     return np.frombuffer(text.encode(), dtype=np.uint8)
 
 
-def _array(name: str, values: np.ndarray, more: str = "") -> str:
-    """A DataArray with its numbers inline: base64 of the blocks' sizes, base64 of the blocks."""
-    kind = _TYPES[values.dtype.newbyteorder("<").str]
-    raw = np.ascontiguousarray(values, dtype=values.dtype.newbyteorder("<")).tobytes()
-    blocks = [zlib.compress(raw[i : i + _BLOCK_BYTES], 1) for i in range(0, len(raw), _BLOCK_BYTES)]
-    head = [len(blocks), _BLOCK_BYTES, len(raw) % _BLOCK_BYTES, *map(len, blocks)]
-    sizes = np.array(head, dtype="<u8").tobytes()
-    inline = base64.b64encode(sizes) + base64.b64encode(b"".join(blocks))
-    components = values.shape[1] if values.ndim == 2 else 1
+def _field(name: str, values: np.ndarray) -> str:
+    """A DataArray with its numbers inline: base64 of the byte count and the bytes."""
+    kind = values.dtype.newbyteorder("<")
+    raw = np.ascontiguousarray(values, dtype=kind).tobytes()
+    inline = base64.b64encode(np.uint64(len(raw)).astype("<u8").tobytes() + raw).decode()
     return (
-        f'<DataArray type="{kind}" Name="{name}" NumberOfComponents="{components}" {more} '
-        f'format="binary">{inline.decode()}</DataArray>'
+        f'<DataArray type="{_TYPES[kind.str]}" Name="{name}" NumberOfComponents="1" '
+        f'NumberOfTuples="{len(values)}" format="binary">{inline}</DataArray>\n'
     )
+
+
+def mapped(path: str, name: str) -> np.ndarray:
+    """An appended array of a file that a VtuWriter wrote, (rows, components), on the disk."""
+    head = b""
+    with open(path, "rb") as file:
+        for line in file:
+            head += line
+            if line.lstrip().startswith(b"<AppendedData"):
+                break
+        begin = len(head)
+        file.seek(begin)
+        begin += file.read(8).index(b"_") + 1
+        pattern = (
+            rb'type="(\w+)" Name="%s" NumberOfComponents="(\d+)" format="appended" offset="(\d+)"'
+        )
+        found = re.search(pattern % name.encode(), head)
+        assert found is not None
+        kind = {word: kind for kind, word in _TYPES.items()}[found[1].decode()]
+        place = begin + int(found[3])
+        file.seek(place)
+        size = int.from_bytes(file.read(8), "little")
+    shape = (size // np.dtype(kind).itemsize // int(found[2]), int(found[2]))
+    if size == 0:
+        return np.empty(shape, kind)  # which cannot be mapped
+    return np.memmap(path, kind, "r", place + 8, shape)
