@@ -331,3 +331,18 @@ test("a file of five thousand vertices has less than 3 MB, and its revisions", a
   assert.ok(earlier.vertices > 10 && earlier.vertices < vertices);
   assert.ok(earlier.share > 0.5 * share, "it is drawn");
 });
+
+test("a mesh that is deleted is still seen, and said to be gone", async () => {
+  await stage.mesh({ shape: "torus", epsilon: 0.3, label: "stays" });
+  const page = await see({ shape: "torus", epsilon: 0.25, label: "goes", delete: true });
+  await until(page, () => document.querySelectorAll("#list button").length > 1);
+  const { share } = await picture(page);
+  stage.begin();
+  await until(page, () =>
+    /no longer on the server/.test(document.getElementById("facts").innerText),
+  );
+  assert.doesNotMatch(await text(page, "#list"), /goes/);
+  assert.ok((await picture(page)).share > 0.9 * share);
+  await choose(page, "stays");
+  assert.doesNotMatch(await text(page, "#facts"), /no longer/);
+});

@@ -5,7 +5,8 @@
 Reads a line of JSON for each mesh wanted, {"shape": NAME, "epsilon": E, ...}; writes its name once
 it is declared, and "over" when it is done. "wait": for one more line before it is begun. "hold": for
 one more line once the oracle has answered for so many points. "cancel": it before it is begun.
-"points" instead of "shape": it is reconstructed from them.
+"delete": it after its end and one more line. "points" instead of "shape": it is reconstructed from
+them.
 """
 
 from __future__ import annotations
@@ -108,6 +109,7 @@ def main() -> None:
         hold = wish.pop("hold", None)
         wait = wish.pop("wait", False)
         cancel = wish.pop("cancel", False)
+        delete = wish.pop("delete", False)
         if hold is not None:
             oracle = Held(oracle, hold)
         name = client.create(oracle, **wish).name
@@ -119,6 +121,9 @@ def main() -> None:
         else:
             client.serve(oracle, name, worker="a worker")
         print("over", flush=True)
+        if delete:
+            sys.stdin.readline()
+            client.delete(name)
 
 
 if __name__ == "__main__":

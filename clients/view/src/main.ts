@@ -84,6 +84,7 @@ let chosen = "";
 let recorded = false;
 let list: MeshRow[] = [];
 let mesh: MeshRow | null = null;
+let gone = false; // it was deleted, or its time was over
 let boundary = ""; // of what is shown, in words
 let fault: { kind: FaultKind; next: number; count: number } | { place: string } | null = null;
 let look: Look = {
@@ -133,6 +134,7 @@ function choose(name: string) {
   if (name === chosen) return;
   chosen = name;
   mesh = null;
+  gone = false;
   leaveFault();
   stopTour();
   inspector.reset();
@@ -322,7 +324,7 @@ function drawFacts() {
   };
   const items: HTMLElement[] = [
     element("b", "", mesh.label || shortName(mesh.name)),
-    badgeOf(mesh),
+    gone ? element("span", "badge bad", "no longer on the server") : badgeOf(mesh),
     fact("dimension", `${mesh.k} in R${superscript(mesh.d)}`),
     ...(mesh.ofPoints ? [] : [fact("epsilon", `${Number(mesh.epsilon.toPrecision(4))}`)]),
     fact("vertices", grouped(mesh.vertices)),
@@ -359,6 +361,12 @@ const hear: { [T in FromWorker["type"]]: (m: Extract<FromWorker, { type: T }>) =
     at("connection").textContent = ok ? "" : `Not connected: ${message}. Trying again.`;
   },
   list: ({ meshes }) => {
+    const had = list.some(({ name }) => name === chosen);
+    const has = meshes.some(({ name }) => name === chosen);
+    if (had !== has) {
+      gone = had;
+      drawFacts();
+    }
     list = meshes;
     drawList(at("list"), list, chosen, chooseByHand);
     beside.offer(list, chosen);
