@@ -54,8 +54,8 @@ enum class CentreRule {
 struct Criteria {
   double radius_edge_bound = 2.0;         // rho0 of rule R2, no unit, > 1
   std::optional<double> sliver_bound;     // Theta0 of rule R3, no unit, in [0, 0.3]; 0 turns R3
-                                          // off. Default 0 for k <= 2; 0.2, 0.15, 0.1 for
-                                          // k = 3, 4, 5
+                                          // off. Default 0 for k <= 2; 0.25, 0.15, 0.1 for
+                                          // k = 3, 4, 5; 0.2 for k = 3 with walls
   double picking_radius = 0.4;            // delta: the picking region is B(c_p, delta R_p); in
                                           // (0, 1)
   double small_sliver_radius = 2.0;       // beta: only simplices of circumradius <= beta R_p

@@ -48,6 +48,14 @@ SpecOptions::SpecOptions(CLI::App* command, bool serves) {
   }
   CLI::App* const criteria = command->add_option_group("Criteria", "absent: the server's defaults");
   for (const MeshSetting& setting : CriteriaSettings()) Add(criteria, setting, &options);
+  criteria
+      ->add_option(
+          "--shape", [this](const CLI::results_t&) { return options.good_shape = true; },
+          "good, for closed manifolds of k = 3: --sliver 0.3, and dihedral angles of 18 degrees at "
+          "least in place of 14, with 5 to 25 % more vertices")
+      ->check(CLI::IsMember({"good"}))
+      ->type_name("SHAPE")
+      ->excludes("--sliver");
   command
       ->add_option(
           "--audit",

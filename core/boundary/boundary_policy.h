@@ -32,8 +32,8 @@ class BoundaryPolicy {
   bool MeshesFacesFirst() const { return walls_ > 0; }
   // Whether the inside is never meshed, and the mesh handed out is the boundary's.
   bool LeavesInside() const { return leaves_inside_; }
-  // Whether the dihedral angles of tetrahedra are bounded: walls force sharp ones upon them.
-  bool BoundsDihedrals() const { return k_ == 3 && walls_ > 0; }
+  // Whether walls force sharp dihedral angles upon tetrahedra.
+  bool SharpensDihedrals() const { return k_ == 3 && walls_ > 0; }
 
   // The faces on which each of `seeds` points is queried, a run of all seeds for each face: M, then
   // each wall. Empty: on M alone.

@@ -11,9 +11,11 @@ namespace {
 
 // Cells begin as fake simplices a little larger than the step of the front.
 constexpr double kInradius = 1.2;
-// Theta0 by k: for k = 3 larger bounds do not terminate, for k <= 2 none is needed. A regular
-// simplex's fatness falls quickly with k, so the bound falls with it.
-constexpr double kDefaultSliverBound[kMaxDimension + 1] = {0, 0, 0, 0.2, 0.15, 0.1};
+// Theta0 by k: for k <= 2 none is needed. A regular simplex's fatness falls quickly with k, so the
+// bound falls with it. For k = 3 0.25 takes 1 to 7 % more vertices than 0.2, and simplices tilt a
+// third less. With walls angles are bounded, and 0.2 is enough.
+constexpr double kDefaultSliverBound[kMaxDimension + 1] = {0, 0, 0, 0.25, 0.15, 0.1};
+constexpr double kSliverBoundWithWalls = 0.2;
 // Beyond this bound ten candidates of a picking region are too few to find a point that makes no
 // new sliver, and refinement does not end; 40 are enough at 0.3, the largest bound, with 6 to 25 %
 // more vertices.
@@ -22,10 +24,12 @@ constexpr int kCandidates = 10, kCandidatesForFatter = 40;
 // Of fewer candidates too often none is outside of all shells.
 constexpr int kCandidatesForProtection = 30;
 
-// The least dihedral angles of tetrahedra in manifolds with walls: in solids, whose inner points
-// need no query, and in others. The rule costs solids 5 % more vertices, and T^3 cut by a
-// half-space 1 %. Larger angles are possible with more vertices: 18 degrees in solids with 10 %.
-constexpr double kCosineOf14Degrees = 0.97029572627599647, kCosineOf10Degrees = 0.98480775301220806;
+// The least dihedral angles of tetrahedra. Slivers of the bounds above have mostly more, so that 14
+// degrees cost closed manifolds 0.2 % more vertices at most, and 18 with the fatter nothing to
+// measure; solids 5 %, and T^3 cut by a half-space 1 % for the 10 degrees of manifolds whose walls
+// are found by queries.
+constexpr double kCosineOf18Degrees = 0.95105651629515353, kCosineOf14Degrees = 0.97029572627599647,
+                 kCosineOf10Degrees = 0.98480775301220806;
 // The rule applies down to this share of the size bound, so that it ends: near sharp edges faces
 // are as fine.
 constexpr double kSharpRadius = 0.1;
@@ -36,6 +40,18 @@ constexpr double kSineOfHalfProofTurn = 0.34289780745545134;
 
 constexpr double kDefaultAdvanceEpsilons = 3;
 constexpr double kDefaultAdvanceShare = 0.1;  // of the bounding box's diagonal
+
+// For k = 3.
+double SharpestCosine(const Specification& spec, double sliver_bound) {
+  if (BoundaryPolicy(spec).SharpensDihedrals())  // 18 degrees do not always end there
+    return spec.ambient_dimension == 3 ? kCosineOf14Degrees : kCosineOf10Degrees;
+  return sliver_bound > kFatter ? kCosineOf18Degrees : kCosineOf14Degrees;
+}
+
+double DefaultSliverBound(const Specification& spec) {
+  return BoundaryPolicy(spec).SharpensDihedrals() ? kSliverBoundWithWalls
+                                                  : kDefaultSliverBound[spec.dimension];
+}
 
 }  // namespace
 
@@ -48,10 +64,9 @@ ResolvedCriteria Resolve(const Specification& spec) {
     r.epsilon = std::min(r.epsilon, RadiusOfHalfTurn(kSineOfHalfProofTurn, r.shape.reach));
   }
   r.radius_edge_bound = c.radius_edge_bound;
-  r.shape.sliver_bound = c.sliver_bound.value_or(kDefaultSliverBound[spec.dimension]);
-  if (BoundaryPolicy(spec).BoundsDihedrals() && r.shape.sliver_bound > 0) {
-    const bool is_solid = spec.ambient_dimension == 3;
-    r.shape.sharpest_cosine = is_solid ? kCosineOf14Degrees : kCosineOf10Degrees;
+  r.shape.sliver_bound = c.sliver_bound.value_or(DefaultSliverBound(spec));
+  if (spec.dimension == 3 && r.shape.sliver_bound > 0) {
+    r.shape.sharpest_cosine = SharpestCosine(spec, r.shape.sliver_bound);
     r.shape.sharp_radius = kSharpRadius;
   }
   r.picking_radius = c.picking_radius;

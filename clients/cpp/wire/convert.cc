@@ -74,6 +74,9 @@ tl::unexpected<Error> Invalid(const std::string& why) {
 
 // Servers take so much; an oracle that is made of many others may say more.
 constexpr size_t kMostAboutItself = 300;
+// The server asks for larger dihedral angles, and tries more candidates, where the bound is above
+// its default.
+constexpr double kGoodSliverBound = 0.3;
 
 std::string FirstCharacters(std::string_view utf8, size_t most) {
   size_t end = 0;
@@ -97,6 +100,21 @@ Expected<void> CheckLabels(const std::vector<std::uint8_t>& labels, int walls) {
   }
   if (*std::max_element(labels.begin(), labels.end()) > kHighestLabel) {
     return Invalid("labels have to be numbers from 0, outside of M, to 127");
+  }
+  return {};
+}
+
+Expected<void> CheckShape(const Oracle& oracle, const MeshOptions& options) {
+  if (!options.good_shape) return {};
+  if (oracle.dimension() != 3) {
+    return Invalid("good_shape is for k = 3, and the manifold has k = " +
+                   std::to_string(oracle.dimension()));
+  }
+  if (oracle.walls() > 0) {
+    return Invalid("good_shape is for closed manifolds, and this one has a boundary");
+  }
+  if (options.sliver_bound) {
+    return Invalid("good_shape says what sliver_bound is: give one of them");
   }
   return {};
 }
@@ -129,6 +147,7 @@ Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
   if (options.workers < 1 || options.workers > 1024) {
     return Invalid("workers is " + std::to_string(options.workers) + " but must be 1 to 1024");
   }
+  if (const auto ok = CheckShape(oracle, options); !ok) return tl::unexpected(ok.error());
   const std::uint32_t d = static_cast<std::uint32_t>(oracle.ambient_dimension());
   v1::MeshSpec spec;
   spec.set_dimension(static_cast<std::uint32_t>(oracle.dimension()));
@@ -158,6 +177,7 @@ Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
   v1::Criteria& criteria = *spec.mutable_criteria();
   if (options.radius_edge_bound) criteria.set_radius_edge_bound(*options.radius_edge_bound);
   if (options.sliver_bound) criteria.set_sliver_bound(*options.sliver_bound);
+  if (options.good_shape) criteria.set_sliver_bound(kGoodSliverBound);
   if (options.picking_radius) criteria.set_picking_radius(*options.picking_radius);
   if (options.small_sliver_radius) criteria.set_small_sliver_radius(*options.small_sliver_radius);
   if (options.candidates) criteria.set_candidates(*options.candidates);

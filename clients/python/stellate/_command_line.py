@@ -65,6 +65,7 @@ _SERVING = {"--max-chunk": "max_chunk", "--workers": "workers"}
 _CRITERIA = {
     "--radius-edge": "radius_edge_bound",
     "--sliver": "sliver_bound",
+    "--shape": "shape",
     "--picking-radius": "picking_radius",
     "--small-sliver-radius": "small_sliver_radius",
     "--candidates": "candidates",

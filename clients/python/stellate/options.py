@@ -32,6 +32,7 @@ import numpy as np
 __all__ = ["MeshOptions", "SpecOptions"]
 
 Audit = Literal["standard", "thorough"]
+Shape = Literal["good"]
 F = TypeVar("F", bound=Callable[..., Any])
 
 
@@ -43,8 +44,13 @@ class SpecOptions(TypedDict, total=False):
     ]
     sliver_bound: Annotated[
         Optional[float],
-        "least fatness of a simplex, rule R3 (Theta0), 0: off; default 0 for k <= 2, and 0.2, 0.15, "
-        "0.1 for k = 3, 4, 5",
+        "least fatness of a simplex, rule R3 (Theta0), 0: off; default 0 for k <= 2, and 0.25, "
+        "0.15, 0.1 for k = 3, 4, 5, 0.2 for k = 3 with a boundary",
+    ]
+    shape: Annotated[
+        Optional[Shape],
+        "'good', for closed manifolds of k = 3: sliver_bound 0.3, and dihedral angles of 18 degrees at least in place "
+        "of 14, with 5 to 25 % more vertices",
     ]
     picking_radius: Annotated[
         Optional[float], "size of the picking region in circumradii (delta); default 0.4"

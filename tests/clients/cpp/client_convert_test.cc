@@ -200,6 +200,20 @@ TEST(Spec, CarriesWhatIsGivenAndNothingElse) {
   EXPECT_EQ(fuller->audit(), v1::AUDIT_THOROUGH);
 }
 
+TEST(Spec, KnowsWhatGoodShapeIs) {
+  const auto rotations = MakeManifold("so3").value();
+  MeshOptions options;
+  options.good_shape = true;
+  EXPECT_EQ(ToSpec(*rotations, options)->criteria().sliver_bound(), 0.3);
+  options.sliver_bound = 0.28;
+  EXPECT_EQ(ToSpec(*rotations, options).error().message,
+            "good_shape says what sliver_bound is: give one of them");
+  options.sliver_bound.reset();
+  const auto refused = ToSpec(*MakeManifold("torus").value(), options);
+  ASSERT_FALSE(refused.has_value());
+  EXPECT_EQ(refused.error().message, "good_shape is for k = 3, and the manifold has k = 2");
+}
+
 TEST(Spec, RefusesWhatTheWireCannotSay) {
   const auto manifold = MakeManifold("torus").value();
   MeshOptions options;

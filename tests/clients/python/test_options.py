@@ -69,7 +69,7 @@ def some(kind):
 
 
 def test_the_protocol_has_no_field_without_an_option():
-    given = {name: some(kind) for name, kind in OF_SPEC.items()}
+    given = {name: some(kind) for name, kind in OF_SPEC.items() if name != "shape"}
     spec = mesh_spec(CheckedOracle(Everything()), 0.25, given)
     for message in (spec, spec.criteria, spec.limits):
         set_there = {field.name for field, _ in message.ListFields()}
@@ -103,7 +103,7 @@ def test_each_has_a_flag(monkeypatch):
 
 def test_the_program_stellate_has_the_same_flags(repository):
     settings = (repository / "clients" / "cli" / "mesh_settings.cc").read_text()
-    theirs = {*re.findall(r'^ +\{"(--[a-z-]+)', settings, re.M), "--audit"}
+    theirs = {*re.findall(r'^ +\{"(--[a-z-]+)', settings, re.M), "--audit", "--shape"}
     assert theirs - {"--reconnect"} == set(_command_line.FLAGS)
 
 
@@ -115,3 +115,36 @@ def test_the_page_of_criteria_names_each(repository):
 def test_none_is_the_same_as_not_given():
     oracle = CheckedOracle(Everything())
     assert mesh_spec(oracle, 0.25, dict.fromkeys(OF_SPEC)) == mesh_spec(oracle, 0.25, {})
+
+
+class Solid(Everything):
+    dimension = 3
+
+
+class Closed:
+    dimension, ambient_dimension = 3, 4
+    seeds = np.ones((1, 4))
+
+    def closest_point(self, x):
+        return x
+
+
+def test_good_shape_is_a_sliver_bound():
+    oracle = CheckedOracle(Closed())
+    spec = mesh_spec(oracle, 0.25, {"shape": "good", "sliver_bound": None})
+    assert spec == mesh_spec(oracle, 0.25, {"sliver_bound": 0.3})
+
+
+@pytest.mark.parametrize(
+    "oracle, given, words",
+    [
+        (Closed, {"shape": "nice"}, "shape is 'nice' but must be 'good'"),
+        (Closed, {"shape": "good", "sliver_bound": 0.2}, "give one of them"),
+        (Solid, {"shape": "good"}, "closed manifolds, and this one has a boundary"),
+        (Everything, {"shape": "good"}, "shape 'good' is for k = 3, and the manifold has k = 2"),
+    ],
+)
+def test_good_shape_is_refused_where_it_says_nothing(oracle, given, words):
+    with pytest.raises(stellate.InvalidArgument, match=words) as caught:
+        mesh_spec(CheckedOracle(oracle()), 0.25, given)
+    assert "shape" in caught.value.details["fields"]

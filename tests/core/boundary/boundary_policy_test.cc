@@ -20,7 +20,7 @@ void ExpectNone(const BoundaryPolicy& policy, int k) {
   EXPECT_EQ(policy.last_stage(), k);
   EXPECT_FALSE(policy.MeshesFacesFirst());
   EXPECT_FALSE(policy.LeavesInside());
-  EXPECT_FALSE(policy.BoundsDihedrals());
+  EXPECT_FALSE(policy.SharpensDihedrals());
   EXPECT_TRUE(policy.FacesOfSeeds(3).empty());
   EXPECT_EQ(policy.QueriesOfSeed(), 1);
   EXPECT_FALSE(policy.TakesClearances());
@@ -62,10 +62,10 @@ TEST(BoundaryPolicyTest, MeshesFacesByDimensionThenTheInside) {
 
 TEST(BoundaryPolicyTest, KnowsSolids) {
   EXPECT_TRUE(BoundaryPolicy(SpecOf(3, 3, 1)).FillsSpace());
-  EXPECT_TRUE(BoundaryPolicy(SpecOf(3, 3, 1)).BoundsDihedrals());
+  EXPECT_TRUE(BoundaryPolicy(SpecOf(3, 3, 1)).SharpensDihedrals());
   EXPECT_FALSE(BoundaryPolicy(SpecOf(3, 4, 1)).FillsSpace());
-  EXPECT_TRUE(BoundaryPolicy(SpecOf(3, 4, 1)).BoundsDihedrals());
-  EXPECT_FALSE(BoundaryPolicy(SpecOf(2, 2, 1)).BoundsDihedrals());
+  EXPECT_TRUE(BoundaryPolicy(SpecOf(3, 4, 1)).SharpensDihedrals());
+  EXPECT_FALSE(BoundaryPolicy(SpecOf(2, 2, 1)).SharpensDihedrals());
 }
 
 }  // namespace

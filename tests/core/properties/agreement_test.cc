@@ -39,7 +39,7 @@ TEST_P(Agreement, TakesFewPointsWhateverTheSeed) {
     const Report& report = run.report();
     EXPECT_TRUE(report.certificate.certified) << report.certificate.verdict;
     EXPECT_EQ(report.certificate.inconsistent_simplices, 0u);
-    EXPECT_GE(report.certificate.min_fatness, std::pow(0.2, 3));
+    EXPECT_GE(report.certificate.min_fatness, std::pow(0.25, 3));
     const double vertices = static_cast<double>(report.counts.vertices);
     EXPECT_LE(static_cast<double>(report.counts.inserted_inconsistent), GetParam().most * vertices);
   });

@@ -1,9 +1,14 @@
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "core/complex/consistency.h"
 #include "core/refinement/criteria.h"
+#include "tests/core/support/dihedrals.h"
 #include "tests/core/support/in_process_run.h"
 
 namespace stellate::core {
@@ -264,6 +269,38 @@ TEST(Refinement, LeavesSharedQuestionsAsTheyWere) {
     EXPECT_EQ(before->blocks.front().points, asked) << "when the run is over";
     EXPECT_EQ(mesher->NextBatch(), nullptr);
   }
+}
+
+double LeastDihedralOf(const Mesher& mesher) {
+  const auto points = mesher.Points();
+  const std::vector<std::uint32_t> simplices = mesher.Simplices();
+  double least = 180;
+  for (std::size_t s = 0; s < simplices.size(); s += 4) {
+    std::array<Eigen::VectorXd, 4> corners;
+    for (std::size_t i = 0; i < 4; ++i) corners[i] = points.col(simplices[s + i]);
+    least = std::min(least, stellate::testing::DihedralAnglesOf(corners).first);
+  }
+  return least;
+}
+
+// Within the size at which angles are asked for: there is no smaller simplex here.
+TEST(Refinement, BoundsDihedralAnglesOfClosedManifolds) {
+  for (const auto& [name, epsilon] :
+       {std::pair("sphere:3", 0.3), std::pair("so3", 0.4), std::pair("flat-torus:3", 0.35)})
+    for (const bool speculative : {false, true}) {
+      const auto manifold = Make(name);
+      Specification spec = SpecificationFor(*manifold, epsilon);
+      spec.criteria.speculative = speculative;
+      const DrivenRun usual = Drive(spec, *manifold);
+      ExpectGoodMesh(usual, manifold->facts());
+      EXPECT_GE(LeastDihedralOf(*usual.mesher), 14) << name;
+      spec.criteria.sliver_bound = 0.3;
+      const DrivenRun good = Drive(spec, *manifold);
+      ExpectGoodMesh(good, manifold->facts());
+      EXPECT_GE(LeastDihedralOf(*good.mesher), 18) << name;
+      spec.criteria.sliver_bound = 0;
+      EXPECT_LT(LeastDihedralOf(*Drive(spec, *manifold).mesher), 10) << name << ": R3 is off";
+    }
 }
 
 // The largest bound that may be asked for, with the candidates that it takes.

@@ -31,6 +31,9 @@ _SERVING = set(types(MeshOptions)) - set(types(SpecOptions))  # keywords of stel
 # Arguments with names of their own, which somebody may have meant.
 _NAMED = {"epsilon", "server", "on_progress", "credentials", "checkpoint", "save", "keep"}
 _AUDITS = {name: pb.Audit.Value(f"AUDIT_{name.upper()}") for name in get_args(Audit)}
+# The server asks for larger dihedral angles, and tries more candidates, where the bound is above
+# its default.
+_GOOD_SLIVER_BOUND = 0.3
 _LIMITS = {field.name for field in pb.MeshLimits.DESCRIPTOR.fields}
 
 
@@ -68,6 +71,8 @@ def mesh_spec(oracle: CheckedOracle, epsilon: float, options: Mapping[str, Any])
             _set(spec.limits, name, value)
         elif name == "audit":
             _set(spec, name, _audit(value))
+        elif name == "shape":
+            _set(spec.criteria, "sliver_bound", _sliver_bound(value, oracle, options))
         elif name == "seeds":
             spec.seeds.CopyFrom(to_wire(points_of(value, oracle.ambient_dimension)))
         elif name in _SPEC:
@@ -102,6 +107,21 @@ def _audit(value: Any) -> int:
             details={"fields": {"audit": "must be 'standard' or 'thorough'"}},
         )
     return _AUDITS[value]
+
+
+def _sliver_bound(shape: Any, oracle: CheckedOracle, options: Mapping[str, Any]) -> float:
+    wrong = ""
+    if shape != "good":
+        wrong = f"is {shape!r} but must be 'good'"
+    elif oracle.dimension != 3:
+        wrong = f"'good' is for k = 3, and the manifold has k = {oracle.dimension}"
+    elif oracle.walls > 0:
+        wrong = "'good' is for closed manifolds, and this one has a boundary"
+    elif options.get("sliver_bound") is not None:
+        wrong = "'good' says what sliver_bound is: give one of them"
+    if wrong:
+        raise InvalidArgument(f"shape {wrong}", details={"fields": {"shape": wrong}})
+    return _GOOD_SLIVER_BOUND
 
 
 def _unknown(name: str) -> str:
