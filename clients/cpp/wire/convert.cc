@@ -197,7 +197,7 @@ Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
   if (options.busy_time) limits.set_busy_seconds(options.busy_time->count());
   if (options.box_seeds) spec.set_box_seeds(*options.box_seeds);
   if (options.components) spec.set_components(*options.components);
-  if (options.thorough_audit) spec.set_audit(v1::AUDIT_THOROUGH);
+  if (options.thorough_audit.value_or(false)) spec.set_audit(v1::AUDIT_THOROUGH);
   if (options.reach) spec.set_declared_reach(*options.reach);
   if (options.cover_box) spec.set_cover_box(*options.cover_box);
   if (options.boundary_only) spec.set_boundary_only(*options.boundary_only);

@@ -21,7 +21,8 @@ namespace stellate {
 // again, twice at most, with what its certificate shows. No length: a length of -1 is refused.
 inline constexpr double kAuto = -std::numeric_limits<double>::infinity();
 
-// What to mesh and how. Absent values take the server's defaults; see mesh.proto for each.
+// What to mesh and how. What is absent (nullopt; an empty text, function or matrix) takes the
+// server's default; see mesh.proto for each.
 struct MeshOptions {
   double epsilon = 0;  // largest circumradius of a simplex, a length, or kAuto; required
   // Called on the calling thread with each epsilon that kAuto chose; Report::epsilon_reason has the
@@ -49,7 +50,8 @@ struct MeshOptions {
   std::optional<std::uint64_t> max_batch_queries;  // larger rounds are sent in several batches
   std::optional<std::uint32_t> box_seeds;
   std::optional<std::uint32_t> components;  // of M, at least; a mesh with fewer is not certified
-  bool thorough_audit = false;  // query every vertex and every simplex for the certificate
+  // Query every vertex and every simplex for the certificate.
+  std::optional<bool> thorough_audit;
   // A promise: the manifold's reach is at least this length. The mesh is refined until the promise
   // proves its topology, or is refuted; see docs/using/proof.md.
   std::optional<double> reach;
