@@ -66,7 +66,8 @@ export async function follow(page, labels) {
     );
     assertSeen(first, `${label}, growing`);
     assertSeen(done, `${label}, done`);
-    assert.ok(first.vertices < done.vertices && done.simplices > 0, label);
+    // A page that is slow may see the end first: the steps below hold that it grew.
+    assert.ok(first.vertices <= done.vertices && done.simplices > 0, label);
     // Half of them at least, as they come or afterwards.
     const steps = new Set(revisions).size;
     const least = Math.min(done.revision / 2 - 1, 25);

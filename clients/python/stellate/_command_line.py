@@ -243,7 +243,7 @@ def _add_settings(command: argparse.ArgumentParser, serves: bool) -> None:
     run = {**_RUN, **_SERVING} if serves else _RUN
     for to, flags in ((command, run), (criteria, _CRITERIA)):
         for flag, name in flags.items():
-            kind, help = _options.plain_type(kinds[name]), words[name]
+            kind, help = _options.plain_type(kinds[name]), words[name].replace("%", "%%")
             choices = _options.choices(kinds[name])
             if kind is bool:
                 both = argparse.BooleanOptionalAction
