@@ -74,9 +74,10 @@ TEST_F(LiveDownloadTest, AMeshIsReadWholeOrResumedAnywhere) {
   EXPECT_EQ(whole.vertices, mesh.report().counts().vertices());
   EXPECT_EQ(whole.simplices, mesh.report().counts().simplices());
 
+  // Rows come sorted, at positions after those of the order that they had before the mesh ended.
   for (const std::uint64_t position :
-       {std::uint64_t{1}, whole.vertices - 1, whole.vertices, whole.vertices + 1,
-        (whole.vertices + whole.next) / 2, whole.next - 1, whole.next}) {
+       {std::uint64_t{1}, whole.vertices - 1, whole.vertices, whole.next - whole.simplices + 1,
+        whole.next - whole.simplices / 2, whole.next - 1, whole.next}) {
     Part rest;
     rest.revision = whole.revision;
     rest.next = position;
@@ -86,6 +87,33 @@ TEST_F(LiveDownloadTest, AMeshIsReadWholeOrResumedAnywhere) {
     EXPECT_EQ(rest.points, whole.points.substr(24 * std::min(position, whole.vertices)));
     EXPECT_TRUE(whole.cells.ends_with(rest.cells));
     EXPECT_TRUE(position > whole.vertices || rest.cells == whole.cells);
+  }
+}
+
+std::multiset<std::string> RowsOf(const std::string& cells) {
+  std::multiset<std::string> rows;
+  for (std::size_t i = 0; i < cells.size(); i += 12) rows.insert(cells.substr(i, 12));
+  return rows;
+}
+
+TEST_F(LiveDownloadTest, OneThatWasBegunBeforeTheEndGoesOnInItsOrder) {
+  Start();
+  const std::string name = MeshSphere(0.1);
+  Part whole;
+  EXPECT_TRUE(Download(name, &whole).ok());
+  const std::multiset<std::string> all = RowsOf(whole.cells);
+  const std::uint64_t end = whole.next - whole.simplices;
+  for (const std::uint64_t position :
+       {whole.vertices + 1, (whole.vertices + end) / 2, end - 1, end}) {
+    Part rest;
+    rest.revision = whole.revision;
+    rest.next = position;
+    EXPECT_TRUE(Download(name, &rest).ok());
+    EXPECT_TRUE(rest.complete);
+    EXPECT_EQ(rest.next, end);
+    const std::multiset<std::string> rows = RowsOf(rest.cells);
+    EXPECT_TRUE(std::includes(all.begin(), all.end(), rows.begin(), rows.end()));
+    EXPECT_GE(rows.size() + (position - whole.vertices), all.size());
   }
 }
 
