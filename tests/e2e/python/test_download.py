@@ -1,7 +1,7 @@
 """Fetching meshes that are on a server."""
 
-import pathlib
 import os
+import pathlib
 import resource
 import subprocess
 import sys
