@@ -164,8 +164,9 @@ TextLayout Msh(const FileShape& shape) {
   for (const FileShape::Cells& cells : shape.groups) {
     // Two tags for each element: its physical group and its geometrical entity, by the same number.
     const std::string tag = std::to_string(cells.tag) + " ";
-    layout.groups.push_back(
-        {"", " " + std::to_string(kElementTypes[cells.dimension]) + " 2 " + tag + tag});
+    std::string middle = " " + std::to_string(kElementTypes[cells.dimension]) + " 2 ";
+    middle.append(tag).append(tag);
+    layout.groups.push_back({"", std::move(middle)});
   }
   return layout;
 }

@@ -254,7 +254,7 @@ class VtuWriter final : public MeshWriter {
     if (auto ok = Begin(name); !ok) return ok;
     std::vector<Number> block;
     const auto flush = [&] {
-      const auto ok = Append(name, block.data(), std::ssize(block));
+      auto ok = Append(name, block.data(), std::ssize(block));
       block.clear();
       return ok;
     };

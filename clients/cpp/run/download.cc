@@ -124,7 +124,7 @@ class Download {
       Tell(files->vertices() + files->simplices());
       return *taken == PartFiles::Taken::kYes;
     };
-    const Expected<bool> fetched = Fetch(take);
+    Expected<bool> fetched = Fetch(take);
     if (!fetched || !*fetched) return fetched;
     if (auto ok = CheckSize(files->vertices(), files->simplices()); !ok)
       return tl::unexpected(ok.error());
