@@ -12,6 +12,7 @@ from ._generated import stellate_pb2 as pb
 from ._generated import stellate_pb2_grpc as rpc
 from ._generated.mesh_pb2 import MeshSpec
 from ._rank import find_singular
+from ._wire.calls import end
 from ._wire.spec import mesh_spec
 from .errors import ExecutorError, InvalidArgument, OracleError, from_rpc, protocol_error
 from .oracle import CheckedOracle
@@ -59,7 +60,7 @@ def _ask_server(
     except grpc.RpcError as error:
         raise failure or from_rpc(error) from None  # there was no examination
     finally:
-        call.cancel()
+        end(call)
     raise protocol_error("the examination ended without a report")
 
 

@@ -10,6 +10,7 @@ import grpc
 from ._generated import stellate_pb2 as pb
 from ._generated import stellate_pb2_grpc as rpc
 from ._reconnect import Reconnector
+from ._wire.calls import end
 from .errors import from_rpc, protocol_error
 
 Self = TypeVar("Self", bound="ResumableStream[Any]")
@@ -64,7 +65,7 @@ class ResumableStream(ABC, Generic[Message]):
         self._over = True
         self._attempts.stop()
         if self._stream is not None:
-            self._stream.cancel()
+            end(self._stream)
 
 
 class Watch(ResumableStream[pb.WatchMeshResponse]):

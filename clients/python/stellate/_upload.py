@@ -15,6 +15,7 @@ from ._generated import stellate_pb2_grpc as rpc
 from ._info import MeshInfo
 from ._reconnect import Reconnector
 from ._wire.arrays import fill
+from ._wire.calls import end
 from .errors import from_rpc
 
 _CHUNK_BYTES = 1 << 20  # of the points in a message, where the server takes so much
@@ -69,7 +70,10 @@ class Upload:
         self._call = call
         if self._stopped.is_set():  # by another thread, which saw no call
             call.cancel()
-        return call.result()
+        try:
+            return call.result()
+        finally:
+            end(call)
 
     def _chunks(self, first: int) -> Iterator[pb.PointsChunk]:
         yield pb.PointsChunk(mesh=self._name)

@@ -18,6 +18,7 @@ from ._generated.stellate_pb2 import GetMeshRequest
 from ._reconnect import WAITS, Reconnector, ReconnectPolicy
 from ._wire import enums
 from ._wire.arrays import fill, from_wire
+from ._wire.calls import end
 from .errors import (
     ExecutorError,
     FailedPrecondition,
@@ -251,7 +252,7 @@ class Worker:
             return self._answer_all(outbox, _Inbox(call))
         finally:
             outbox.end()
-            call.cancel()  # unless it has ended
+            end(call)
 
     def _answer_all(self, outbox: _Outbox, inbox: _Inbox) -> str:
         state = ""
