@@ -4,6 +4,7 @@ import (
 	"errors"
 	"fmt"
 	"slices"
+	"strings"
 
 	pb "stellate/proto/v1"
 )
@@ -23,6 +24,8 @@ type growingComplex struct {
 	turned         []byte   // as Mesh.Turned, of the last revision; nil: not told
 	turnedRows     []uint32 // of a download
 	untold         bool     // a part of the download was not oriented
+	places         []string // of a download of a reconstruction
+	smoothed       []float64
 }
 
 // growthOf is the empty mesh of a specification. The boundary alone has simplices of one dimension less.
@@ -149,6 +152,19 @@ func (g *growingComplex) orientPart(part *pb.DownloadMeshResponse) error {
 	return nil
 }
 
+// addPlaces notes what became of the points of a part of a download, that addPoints has just taken.
+func (g *growingComplex) addPlaces(part *pb.Places) error {
+	for _, code := range part.GetCodes() {
+		g.places = append(g.places, strings.TrimPrefix(pb.Place(code).String(), "PLACE_"))
+	}
+	if part.GetSmoothed() == nil {
+		return nil
+	}
+	positions, err := numbers(part.GetSmoothed(), len(part.GetCodes()), g.d)
+	g.smoothed = append(g.smoothed, positions...)
+	return err
+}
+
 // downloaded is the mesh of a download that is complete.
 func (g *growingComplex) downloaded() (*Mesh, error) {
 	if err := g.settle(); err != nil {
@@ -157,7 +173,14 @@ func (g *growingComplex) downloaded() (*Mesh, error) {
 	if !g.untold {
 		g.turned = bitsOf(g.rows, g.turnedRows, g.k+1)
 	}
-	return g.finished()
+	mesh, err := g.finished()
+	if err == nil && len(g.places) == mesh.VertexCount() {
+		mesh.Places = g.places
+	}
+	if err == nil && len(g.smoothed) == len(mesh.Points) {
+		mesh.Smoothed = g.smoothed
+	}
+	return mesh, err
 }
 
 // finished is the mesh at its end, with its orientation.

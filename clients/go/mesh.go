@@ -22,9 +22,13 @@ type Mesh struct {
 	Simplices        []uint32  // [m, k+1], zero-based, ascending in each row, rows in lexicographic order
 	Walls            []uint64  // [n], as bits the walls that each vertex lies on; nil without a boundary
 	Turned           []byte    // see OrientedSimplices; as the protocol has Orientation.turned
-	Revision         uint64    // one for each round that changed the mesh
-	Progress         *pb.Progress
-	Report           *pb.Report // how it ended and what is proved; nil while it grows
+	// Places says what became of each point of a reconstruction, "OK" or another Place of mesh.proto; nil of
+	// other meshes.
+	Places   []string
+	Smoothed []float64 // [n, d], the positions that a reconstruction of noisy points was built on, or nil
+	Revision uint64    // one for each round that changed the mesh
+	Progress *pb.Progress
+	Report   *pb.Report // how it ended and what is proved; nil while it grows
 }
 
 // VertexCount is n.

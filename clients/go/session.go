@@ -54,13 +54,22 @@ func NewMesh(ctx context.Context, oracle Oracle, epsilon float64, options *Optio
 	if failure != nil {
 		return nil, failure
 	}
-	if options.RequireCertified && !finished.Certified() {
-		verdict := finished.Report.GetCertificate().GetVerdict()
-		err := newError(ErrNotCertified, "NOT_CERTIFIED", "the mesh is not certified: %s", verdict)
-		err.Mesh = finished
-		return nil, err
+	if options.RequireCertified {
+		if err := insistOnCertified(finished); err != nil {
+			return nil, err
+		}
 	}
 	return finished, nil
+}
+
+func insistOnCertified(mesh *Mesh) error {
+	if mesh.Certified() {
+		return nil
+	}
+	verdict := mesh.Report.GetCertificate().GetVerdict()
+	err := newError(ErrNotCertified, "NOT_CERTIFIED", "the mesh is not certified: %s", verdict)
+	err.Mesh = mesh
+	return err
 }
 
 // Watch gives the mesh as it grows; the last one has its report. Leaving the loop cancels the mesh.
@@ -267,10 +276,7 @@ func (c *Client) session(ctx context.Context, oracle *checkedOracle, info *pb.Me
 	}
 	dismiss()
 	if !kept {
-		limited, cancel := context.WithTimeout(context.WithoutCancel(ctx), callTime)
-		defer cancel()
-		// Once: it ends with its server, or somebody else was first.
-		_, _ = call(limited, c.outage(), true, &pb.DeleteMeshRequest{Name: info.GetName()}, c.stub.DeleteMesh)
+		c.deleteOnce(ctx, info.GetName())
 	}
 	var ours *Error
 	if ctx.Err() != nil && errors.As(err, &ours) {
@@ -280,6 +286,14 @@ func (c *Client) session(ctx context.Context, oracle *checkedOracle, info *pb.Me
 		}
 	}
 	return err
+}
+
+// deleteOnce forgets a mesh of one's own, even after the context's end. Once: it ends with its server, or
+// somebody else was first.
+func (c *Client) deleteOnce(ctx context.Context, name string) {
+	limited, cancel := context.WithTimeout(context.WithoutCancel(ctx), callTime)
+	defer cancel()
+	_, _ = call(limited, c.outage(), true, &pb.DeleteMeshRequest{Name: name}, c.stub.DeleteMesh)
 }
 
 func withMesh(ours, theirs error) error {
@@ -299,8 +313,18 @@ func (c *Client) Download(ctx context.Context, name string, revision uint64) (*M
 	if info.GetEndTime() == nil && revision == 0 {
 		return nil, newError(ErrFailedPrecondition, "FAILED_PRECONDITION", "%s is not over: %v", name, info.GetState())
 	}
+	mesh, err := c.assemble(ctx, info, revision)
+	if err != nil || revision > 0 {
+		return mesh, err
+	}
+	return mesh, judge(mesh, info)
+}
+
+// assemble downloads a mesh, with the progress and report of one that is over.
+func (c *Client) assemble(ctx context.Context, info *pb.Mesh, revision uint64) (*Mesh, error) {
 	growth := growthOf(info.GetSpec())
-	err = c.parts(ctx, &pb.DownloadMeshRequest{Name: name, Revision: revision}, func(part *pb.DownloadMeshResponse) error {
+	request := &pb.DownloadMeshRequest{Name: info.GetName(), Revision: revision}
+	err := c.parts(ctx, request, func(part *pb.DownloadMeshResponse) error {
 		growth.revision = part.GetRevision()
 		points, err := numbers(part.GetPoints(), -1, growth.d)
 		if err == nil {
@@ -312,6 +336,9 @@ func (c *Client) Download(ctx context.Context, name string, revision uint64) (*M
 		}
 		if err == nil {
 			err = growth.orientPart(part)
+		}
+		if err == nil {
+			err = growth.addPlaces(part.GetPlaces())
 		}
 		if err != nil {
 			return protocolError(err)
@@ -326,5 +353,5 @@ func (c *Client) Download(ctx context.Context, name string, revision uint64) (*M
 		return mesh, err
 	}
 	mesh.Progress, mesh.Report = info.GetProgress(), info.GetReport()
-	return mesh, judge(mesh, info)
+	return mesh, nil
 }
