@@ -2,7 +2,6 @@
 
 $LOAD_PATH.unshift(File.join(__dir__, 'stellate', 'proto'))
 require 'stellate/v1/stellate_services_pb'
-require 'stellate/v1/doctor_services_pb'
 require 'stellate/rpc/status_details_pb'
 require 'stellate/shared'
 $LOAD_PATH.shift
