@@ -24,6 +24,7 @@ module Stellate
       @bits = WORD_BITS / (@k + 1)
       @arrays = @arrays_of = @turned = nil
       @walls, @turned_simplices = {}, []
+      @places, @smoothed = [], []
     end
 
     # Takes one chunk; true when a revision is complete with it.
@@ -109,6 +110,12 @@ module Stellate
       end
     end
 
+    # Takes what became of the points of a part of a download.
+    def add_places(part)
+      part.codes.each_byte { |code| @places << (V1::Place.lookup(code) || code).to_s.delete_prefix('PLACE_') }
+      @smoothed.concat(Wire.numbers(part.smoothed, part.codes.bytesize, @d)) if part.smoothed
+    end
+
     # The points and simplices of mesh(), as arrays of rows, for when nobody waits for this thread.
     def arrays
       @arrays = nil if @arrays_of != @revision
@@ -135,7 +142,10 @@ module Stellate
         turned = @turned_simplices.to_h { |simplex| [simplex, 1] }
         bits = @simplices.map { |simplex| turned.fetch(simplex, 0) }.join
       end
-      mesh(revision, turned: bits && [bits].pack('b*'), **more)
+      mesh = mesh(revision, turned: bits && [bits].pack('b*'), **more)
+      mesh.places = @places if @places.size == mesh.points.size
+      mesh.smoothed = @smoothed.each_slice(@d).to_a if @smoothed.size == @points.size && @smoothed.any?
+      mesh
     end
 
     private

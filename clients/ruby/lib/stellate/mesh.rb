@@ -8,6 +8,9 @@ module Stellate
     attr_reader :dimension, :ambient_dimension, :points, :simplices, :revision, :progress, :report, :walls, :turned
     # What a mesh that is over was made with, and why it is that where 'auto' chose it, else ''; nil of others.
     attr_accessor :epsilon, :epsilon_reason
+    # Of a reconstruction: what became of each point, 'OK' or another Place of mesh.proto; and, where the points
+    # were noisy, the positions that it was built on, in rows. Else nil.
+    attr_accessor :places, :smoothed
 
     def initialize(k, d, points, simplices, revision, progress: nil, report: nil, walls: nil, turned: nil)
       @dimension, @ambient_dimension, @points, @simplices = k, d, points, simplices

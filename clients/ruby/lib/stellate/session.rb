@@ -23,10 +23,7 @@ module Stellate
       finished = nil
       run(oracle, epsilon, false, options) { |mesh| finished = mesh }
       finished.save(save) if save
-      if require_certified && !finished.certified?
-        verdict = finished.report.certificate&.verdict
-        raise NotCertified.new("the mesh is not certified: #{verdict}", reason: 'NOT_CERTIFIED', mesh: finished)
-      end
+      insist_on_certified(finished) if require_certified
       finished
     end
 
@@ -61,6 +58,13 @@ module Stellate
 
     private
 
+    def insist_on_certified(mesh)
+      return if mesh.certified?
+
+      verdict = mesh.report.certificate&.verdict
+      raise NotCertified.new("the mesh is not certified: #{verdict}", reason: 'NOT_CERTIFIED', mesh:)
+    end
+
     def connect(server, credentials)
       return yield(server) if server.is_a?(Client)
       return Server.start { |own| yield(Client.new(own)) } if server.nil?
@@ -81,6 +85,7 @@ module Stellate
         growth.add_points(part.first_vertex, part.points)
         growth.add_walls(part.boundary_vertices, part.boundary_walls)
         growth.add_cells(part.cells, part.orientation)
+        growth.add_places(part.places) if part.places
         :last if part.complete
       end
       more = revision.zero? ? { progress: info.progress, report: info.report } : {}
@@ -120,7 +125,7 @@ module Stellate
     end
 
     def judged(mesh, info)
-      mesh.epsilon, mesh.epsilon_reason = info.spec&.epsilon, ''
+      mesh.epsilon, mesh.epsilon_reason = info.spec&.epsilon, '' unless info.spec&.reconstruction
       case info.state
       when :MESH_STATE_CANCELLED
         raise Cancelled.new('the mesh was cancelled', reason: 'CANCELLED', mesh:)
