@@ -171,5 +171,39 @@ state <- serve(torus$closest_point, declared$name, address,
 )
 stopifnot(identical(state, "SUCCEEDED"))
 client$close()
+
+# Points in, a mesh out: the unit sphere down to a height, evenly.
+sphere <- function(n, lowest = -1) {
+  z <- 1 - (1 - lowest) * (seq_len(n) - 0.5) / n
+  turn <- seq_len(n) * pi * (3 - sqrt(5))
+  cbind(sqrt(1 - z^2) * cos(turn), sqrt(1 - z^2) * sin(turn), z, deparse.level = 0)
+}
+points <- sphere(600)
+phases <- character()
+made <- reconstruct(points, 2,
+  noise = 0, server = address,
+  on_progress = function(progress) phases <<- union(phases, progress$phase)
+)
+stopifnot(made$certified, identical(made$points, points), nrow(made$simplices) == 2 * 600 - 4)
+stopifnot(made$places == "OK", length(made$places) == 600, is.null(made$smoothed))
+stopifnot(length(phases) > 0, range(made$simplices) == c(1, 600))
+points <- sphere(2500)
+around <- norm(points[, 1:2])
+tangents <- array(c(
+  -points[, 2] / around, points[, 1] / around, 0 * around,
+  -points[, 3] * points[, 1:2] / around, around
+), c(2500, 3, 2))
+made <- reconstruct(points, 2, tangents, noise = 0, reach = 1, server = address)
+stopifnot(identical(made$report$certificate$level, "PROVED"))
+made <- reconstruct(sphere(600, -0.2), 2, noise = 0, server = address)
+stopifnot(!made$certified, "EDGE" %in% made$places)
+shaken <- sphere(900)
+shaken <- shaken + 0.01 * sin(12.9898 * seq_along(shaken))
+made <- reconstruct(shaken, 2, server = address)
+stopifnot(identical(dim(made$smoothed), c(900L, 3L)), identical(made$points, shaken))
+shaken[3, 2] <- NA
+stopifnot(grepl("row 3 of points is", failure(reconstruct(shaken, 2, server = address))))
+stopifnot(grepl("numeric matrix", failure(reconstruct(1:9, 2, server = address))))
+stopifnot(grepl("less than d", failure(reconstruct(sphere(50), 3, server = address))))
 server$close()
 cat("R: all is well\n")
