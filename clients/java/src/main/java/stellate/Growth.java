@@ -7,6 +7,8 @@ import java.util.List;
 import stellate.v1.DeltaChunk;
 import stellate.v1.MeshDelta;
 import stellate.v1.Orientation;
+import stellate.v1.Place;
+import stellate.v1.Places;
 
 /**
  * The client's copy of a mesh that grows by deltas: vertices and simplices as of the last complete
@@ -30,6 +32,8 @@ public final class Growth {
   private ByteString turned; // the orientation of the last revision; null: not told
   private final List<int[]> turnedRows = new ArrayList<>(); // of a download
   private boolean untold; // a part of the download was not oriented
+  private final List<String> places = new ArrayList<>(); // of a download of a reconstruction
+  private final List<double[]> smoothed = new ArrayList<>();
 
   /** The empty k-complex in R^d. */
   public Growth(int k, int d) {
@@ -92,6 +96,17 @@ public final class Growth {
     }
   }
 
+  /** Notes what became of the points of a part of a download. */
+  void addPlaces(Places part) {
+    for (byte code : part.getCodes()) {
+      Place place = Place.forNumber(code);
+      places.add(place == null ? "" + code : place.name().substring("PLACE_".length()));
+    }
+    if (part.hasSmoothed()) {
+      smoothed.add(Wire.numbers(part.getSmoothed(), part.getCodes().size(), d));
+    }
+  }
+
   private static void checkBits(ByteString bits, int count) {
     if (bits.size() != Rows.bytesOfBits(count)) {
       throw StellateException.protocol(
@@ -112,7 +127,11 @@ public final class Growth {
   Mesh downloaded() {
     settle();
     int[] chosen = turnedRows.stream().flatMapToInt(Arrays::stream).toArray();
-    return mesh(untold ? null : Rows.bitsOf(rows, chosen, k + 1));
+    Mesh mesh = mesh(untold ? null : Rows.bitsOf(rows, chosen, k + 1));
+    double[] positions = smoothed.stream().flatMapToDouble(Arrays::stream).toArray();
+    return mesh.with(
+        places.size() == count ? List.copyOf(places) : null,
+        count > 0 && positions.length == count * d ? positions : null);
   }
 
   /** Drops the chunks of a revision that was cut short: it will be sent again. */

@@ -9,6 +9,7 @@ import java.nio.file.Files;
 import java.nio.file.Path;
 import java.nio.file.StandardCopyOption;
 import java.util.Arrays;
+import java.util.List;
 import java.util.Optional;
 import stellate.v1.Progress;
 import stellate.v1.Report;
@@ -36,6 +37,8 @@ public final class Mesh {
   private final Progress progress;
   private final Report report;
   private final byte[] turned; // the protocol's Orientation.turned; null: see orientedSimplices()
+  private List<String> places;
+  private double[] smoothed;
 
   Mesh(
       int k,
@@ -60,7 +63,27 @@ public final class Mesh {
 
   Mesh with(Progress now, Report end) {
     return new Mesh(
-        dimension, ambientDimension, points, simplices, walls, revision, now, end, turned);
+            dimension, ambientDimension, points, simplices, walls, revision, now, end, turned)
+        .with(places, smoothed);
+  }
+
+  Mesh with(List<String> what, double[] where) {
+    places = what;
+    smoothed = where;
+    return this;
+  }
+
+  /**
+   * What became of each point of a reconstruction: "OK", or another Place of mesh.proto. Empty for
+   * other meshes.
+   */
+  public Optional<List<String>> places() {
+    return Optional.ofNullable(places);
+  }
+
+  /** [n, d], the positions that a reconstruction of noisy points was built on. */
+  public Optional<double[]> smoothed() {
+    return Optional.ofNullable(smoothed);
   }
 
   /** n */

@@ -35,8 +35,11 @@ public final class Stellate {
           last.set(mesh);
           return true;
         });
-    Mesh finished = last.get();
-    if (options.requireCertified && !finished.certified()) {
+    return checked(last.get(), options.requireCertified);
+  }
+
+  private static Mesh checked(Mesh finished, boolean requireCertified) {
+    if (requireCertified && !finished.certified()) {
       String verdict = finished.report().map(end -> end.getCertificate().getVerdict()).orElse("");
       throw new StellateException(
               StellateException.Kind.NOT_CERTIFIED,
@@ -45,6 +48,44 @@ public final class Stellate {
           .with(finished);
     }
     return finished;
+  }
+
+  /**
+   * Makes a mesh of points on a k-manifold in R^d, or near it: [n, d], one point after the other.
+   * Point i is vertex i of the mesh, and its places say what became of it.
+   */
+  public static Mesh reconstruct(double[] points, int k, int d, ReconstructOptions options) {
+    Cloud cloud = new Cloud(points, k, d, options.tangents);
+    if (options.client != null) {
+      return reconstruct(options.client, cloud, options);
+    }
+    try (Server server = Server.start();
+        Client client = new Client(server)) {
+      return reconstruct(client, cloud, options);
+    }
+  }
+
+  private static Mesh reconstruct(Client client, Cloud cloud, ReconstructOptions options) {
+    Upload upload = new Upload(client, cloud);
+    String name = upload.declare(cloud.spec(options.spec));
+    try {
+      options.cancel.whenComplete((value, error) -> upload.cancel());
+      upload.run(options.onProgress);
+      return checked(download(client, name, 0), options.requireCertified);
+    } catch (StellateException error) {
+      throw options.cancel.isDone() ? cancelled("was cancelled") : error;
+    } finally {
+      forget(client, name);
+    }
+  }
+
+  private static boolean forget(Client client, String name) {
+    try {
+      client.deleteOnce(name);
+      return true;
+    } catch (StellateException error) {
+      return false; // it ends with its server, or somebody else was first
+    }
   }
 
   /**
@@ -91,6 +132,7 @@ public final class Stellate {
                     .addAllBoundaryWalls(part.getBoundaryWallsList())
                     .build());
             growth.orientPart(part.getOrientation());
+            growth.addPlaces(part.getPlaces());
             return part.getComplete();
           });
     }
@@ -163,7 +205,7 @@ public final class Stellate {
     return mesh;
   }
 
-  private static StellateException cancelled(String what) {
+  static StellateException cancelled(String what) {
     return new StellateException(StellateException.Kind.CANCELLED, "CANCELLED", "the mesh " + what);
   }
 
@@ -252,12 +294,8 @@ public final class Stellate {
       throw better(error, failure.get(), options.checkpoint);
     } finally {
       leave(workers, threads, over);
-      try {
-        if (!kept) {
-          client.deleteOnce(info.getName());
-        }
-      } catch (StellateException error) {
-        over = false; // it ends with its server, or somebody else was first
+      if (!kept) {
+        over &= forget(client, info.getName());
       }
     }
   }
