@@ -17,7 +17,8 @@ constexpr double kWorthWhile = 0.1;  // share of a worker's time that a second c
 constexpr double kMostChecked = 16;  // queries at a time
 
 Pace::Chunk Timed(const Lease& lease, TimePoint end) {
-  return {static_cast<double>(lease.count), Seconds(end - lease.started), lease.cut, lease.queued};
+  return {static_cast<double>(lease.count), Seconds(end - lease.started), lease.cut,
+          Seconds(lease.started - lease.sent)};
 }
 
 // Whether only one worker has it, and an idle one would accept it.
@@ -183,9 +184,8 @@ Lease* Dispatch::Find(LeaseId id) {
 Lease Dispatch::Give(WorkerId id, Lease lease, TimePoint now) {
   lease.id = next_lease_++;
   lease.worker = id;
-  lease.started = now;
+  lease.sent = lease.started = now;
   Worker& worker = workers_.at(id);
-  lease.queued = !worker.leases.empty();
   worker.leases.push_back(lease);
   worker.unanswered.insert(lease.id);
   if (!lease.check) worker.newest_chunk = static_cast<std::uint64_t>(lease.count);

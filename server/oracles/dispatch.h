@@ -64,10 +64,10 @@ struct Lease {
   Eigen::Index first = 0;
   Eigen::Index count = 0;
   int timeouts = 0;       // earlier leases of this single query that ran out
+  TimePoint sent;         // when it was given
   TimePoint started;      // when the worker could start on it: chunks of one worker queue up
   TimePoint heard;        // when its worker last sent Busy for it
   bool cut = false;       // smaller than a full chunk: the round ended, or is shared
-  bool queued = false;    // given while its worker had others
   bool check = false;     // a cross-check of another worker's queries
   LeaseId twin = 0;       // the other lease of a hedged piece: the first answer counts
   bool answered = false;  // the twin was first: this answer is only compared

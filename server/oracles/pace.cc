@@ -56,20 +56,25 @@ double Pace::FullChunk() const {
   return std::clamp(queries, 1.0, reach_);
 }
 
-void Pace::Answered(const Chunk& chunk) {
-  // A chunk that travelled while another was being answered seems to have no travel time.
-  const bool overlapped = chunk.queued && kSurprise * chunk.seconds < Seconds(chunk.queries);
-  const bool dearer = chunk.seconds * largest_.queries > largest_.seconds * chunk.queries;
-  if ((!chunk.queued || dearer) && kComparable * chunk.queries >= largest_.queries) {
-    largest_ = chunk;
+void Pace::Answered(const Chunk& measured) {
+  Chunk chunk = measured;
+  // A chunk that travelled while another was being answered, or was answered beside it, seems too
+  // fast. It took no longer than the time since it was sent.
+  const double since_sent = chunk.seconds + chunk.behind;
+  if (chunk.behind > 0 && kSurprise * chunk.seconds < Seconds(chunk.queries)) {
+    chunk.seconds = std::min(since_sent, Seconds(chunk.queries));
+  }
+  const bool dearer = measured.seconds * largest_.queries > largest_.seconds * chunk.queries;
+  const bool cheaper = since_sent * largest_.queries < largest_.seconds * chunk.queries;
+  if ((chunk.behind == 0 || dearer || cheaper) && kComparable * chunk.queries >= largest_.queries) {
+    largest_ = measured;
+    if (cheaper) largest_.seconds = since_sent;
   }
   const bool is_evidence = !chunk.cut || !SizesDiffer() || kSmallCut * chunk.queries >= Largest() ||
                            chunk.seconds > kSurprise * Seconds(chunk.queries);
   if (!is_evidence) return;
-  if (!overlapped) {
-    newest_.push_back(chunk);
-    Fit();
-  }
+  newest_.push_back(chunk);
+  Fit();
   const bool guess = !SizesDiffer();  // all of the time may be the queries'
   const double fixed = guess ? 0 : fixed_;
   const double each = guess ? chunk.seconds / chunk.queries : each_;

@@ -26,9 +26,9 @@ class Pace {
  public:
   struct Chunk {
     double queries = 0;
-    double seconds = 0;
-    bool cut = false;     // smaller than FullChunk
-    bool queued = false;  // sent while the worker had another: its travel took no time
+    double seconds = 0;  // since it was sent or, where that is later, since the answer before it
+    bool cut = false;    // smaller than FullChunk
+    double behind = 0;   // seconds that it waited for that answer: its travel took no time then
   };
   struct Aim {
     double seconds = 0;  // target for a chunk, or four times the fixed cost if that is more

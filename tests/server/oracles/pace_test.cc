@@ -92,12 +92,35 @@ TEST(Pace, APauseBeforeTheFirstAnswerIsForgotten) {
 
 TEST(Pace, AnAnswerThatTravelledBesideAnotherDoesNotSeemFree) {
   Pace pace(kAim);
-  for (int i = 0; i < 20; ++i) {
+  for (int i = 0; i < 300; ++i) {
     const double n = std::floor(pace.FullChunk());
-    pace.Answered({n, 0.5 + 1e-4 * n});
-    pace.Answered({n, 1e-4 * n, false, /*queued=*/true});
+    if (i >= 8) {  // free would be 600,000, and all of it the queries' would be 1
+      EXPECT_GE(n, 1000) << i;
+      EXPECT_LE(n, 20000) << i;
+    }
+    const double first = 0.5 + 1e-4 * n;
+    pace.Answered({n, first});
+    pace.Answered({n, 1e-4 * n, /*cut=*/false, /*behind=*/first});
   }
-  EXPECT_GT(pace.fixed(), 0.3);
+}
+
+// Its next chunk is always there when an answer comes, so each but the first waits behind another.
+TEST(Pace, ChunksGrowThoughTheyQueueUp) {
+  for (const double fixed : {0.0, 0.02, 0.2}) {
+    for (const double each : {1e-6, 1e-4, 1e-2}) {
+      Pace pace(kAim);
+      double behind = 0;
+      for (int i = 0; i < 40; ++i) {
+        const double n = std::floor(pace.FullChunk());
+        const double seconds = fixed + each * n;
+        pace.Answered({n, seconds, /*cut=*/false, behind});
+        behind = seconds;
+      }
+      const double whole = std::max(kAim.seconds, 4 * fixed);
+      EXPECT_GT(pace.FullChunk(), 0.7 * (whole - fixed) / each) << fixed << " and " << each;
+      EXPECT_LT(pace.FullChunk(), 1.2 * whole / each) << fixed << " and " << each;
+    }
+  }
 }
 
 TEST(Pace, NeverMoreThanMayTakeItsTime) {
@@ -118,7 +141,7 @@ TEST(Pace, NonsenseIsBounded) {
   for (int i = 0; i < 2000; ++i) {
     const double n = std::floor(std::min(pace.FullChunk(), 1e9));
     pace.Answered({n, random() % 10 == 0 ? 0.0 : std::pow(10, exponent(random)), random() % 3 == 0,
-                   random() % 2 == 0});
+                   random() % 2 == 0 ? std::pow(10, exponent(random)) : 0.0});
     ASSERT_GE(pace.FullChunk(), 1);
     ASSERT_TRUE(std::isfinite(pace.FullChunk()));
     ASSERT_TRUE(std::isfinite(pace.Seconds(n)));
