@@ -83,6 +83,7 @@ set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS python3-matplotlib)
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME stellate)
 set(CPACK_PACKAGE_VENDOR Stellate)
+set(CPACK_DEBIAN_PACKAGE_HOMEPAGE https://stellate.example)
 # packaging/deb puts who made the packages here.
 set(CPACK_PACKAGE_CONTACT "Made from source <root@localhost>")
 set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})

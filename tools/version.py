@@ -19,7 +19,7 @@ _NPM_LOCK = (
 )
 STATED = {
     "CITATION.cff": r"\nversion: (\S+)",
-    "clients/java/README.md": r"`stellate:stellate:(\S+)`",
+    "clients/java/README.md": r"`[\w.]+:stellate:(\S+)`",
     "clients/java/pom.xml": r"<artifactId>stellate</artifactId>\s*<version>(\S+)</version>",
     "clients/node/package-lock.json": _NPM_LOCK,
     "clients/node/package.json": r'"version": "(\S+)"',
