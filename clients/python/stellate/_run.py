@@ -15,6 +15,7 @@ from ._epsilon import Epsilon, choose
 from ._findings import CheckReport
 from ._follow import Following, OnProgress
 from ._mesh import FinishedMesh, Mesh
+from ._places import Places
 from ._shared import table
 from ._wire.spec import mesh_spec
 from ._worker import Ask, answer, check_max_chunk, join_all
@@ -146,6 +147,7 @@ class Run:
                 f"and is {on_progress!r}"
             )
         max_chunk = check_max_chunk(options.pop("max_chunk", None))
+        self._places = Places(oracle)
         if keep is not None:
             oracle = part_of(oracle, keep, options.get("seeds"))
         checked = CheckedOracle(oracle)
@@ -299,6 +301,7 @@ class Run:
                 if self._checkpoint is not None and not full:
                     self._checkpoint.forget()  # it would fail again
             if not self._interrupted:
+                error = self._places.in_error(error, self._at_work.info.ambient_dimension)
                 raise self._best_reason(error) from None
         if self._interrupted:
             raise self._interruption(mesh)
@@ -351,8 +354,9 @@ class Run:
         )
 
     def _told(self, mesh: M) -> M:
-        """With what the server does not know: why epsilon is what it is, and where the oracle's
-        manifold ends."""
+        """With what the server does not know: why epsilon is what it is, where the oracle's manifold
+        ends, and the coordinates that people know places by."""
+        mesh = self._places.in_mesh(mesh)
         report = mesh.report
         if report is None:
             return mesh

@@ -56,6 +56,9 @@ class Oracle(Protocol):
         where there is none. At most 128 bytes each.
       jacobian(points (n, d)) -> (n, m, d): of the equations that M is given by, if it is. Only
         stellate.check asks, to find where they lose rank.
+      coordinates(points (n, d)) -> (n, m): those that people know points of M by, where M lies in R^d
+        for the mesh's sake only, as a PeriodicCell does: the verdict, warnings, the report's sharpest
+        angle and refusals then name places in these.
       bounding_box: (lower (d,), upper (d,)), where to look for M, or
       seeds: (m, d), points near M, one at least on each component. One of the two is needed.
       thread_safe: True lets several workers call it at once.

@@ -7,7 +7,7 @@ import json
 import math
 import re
 import textwrap
-from typing import Any
+from typing import Any, Callable
 
 import numpy as np
 
@@ -422,6 +422,21 @@ class Report:
         text = "".join(entry(title, mine.get(title, said)) for title, said in self.lines())
         return dataclasses.replace(self, certificate=certificate, text=text)
 
+    def reworded(self, words: Callable[[str], str]) -> Report:
+        """With `words` of all that the server says in sentences: the verdict, warnings, a failure."""
+        c, failure = self.certificate, self.failure
+        warnings = tuple(map(words, c.warnings))
+        certificate = dataclasses.replace(c, verdict=words(c.verdict), warnings=warnings)
+        if failure is not None:
+            failure = dataclasses.replace(failure, message=words(failure.message))
+        text = ""
+        for title, said in dataclasses.replace(self, epsilon_reason="").lines():
+            before = said.replace("\n", " ")
+            after = words(before)
+            as_it_was = f"{title:>{_TITLE_WIDTH}}  " + said.replace("\n", "\n" + _MARGIN) + "\n"
+            text += as_it_was if after == before else entry(title, after)
+        return dataclasses.replace(self, failure=failure, certificate=certificate, text=text)
+
     def __str__(self) -> str:
         why = f"{self.epsilon:g}, {self.epsilon_reason}" if self.epsilon_reason else ""
         return (self.text + (entry("epsilon", why) if why else "")).rstrip("\n")
@@ -445,12 +460,13 @@ class Report:
 
 
 _TITLE_WIDTH = 13  # of the server's lines
+_MARGIN = " " * (_TITLE_WIDTH + 2)  # before what is folded
 
 
 def entry(title: str, words: str) -> str:
     """A line of a report, folded as the server folds its own."""
     lines = textwrap.wrap(words, 85, break_long_words=False, break_on_hyphens=False)
-    return f"{title:>{_TITLE_WIDTH}}  " + f"\n{'':{_TITLE_WIDTH + 2}}".join(lines) + "\n"
+    return f"{title:>{_TITLE_WIDTH}}  " + f"\n{_MARGIN}".join(lines) + "\n"
 
 
 def _certificate(message: pb.Certificate) -> Certificate:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import stellate
 from stellate import oracles
+from stellate._places import Places
 from topology import euler_characteristic
 
 norm = np.linalg.norm
@@ -186,3 +187,53 @@ def test_meshes_that_cannot_be_unwrapped_say_why():
         torus_grid(cell, 7).unwrap(oracles.PeriodicCell(np.array(HEX) * 2))
     with pytest.raises(stellate.InvalidArgument, match="copies"):
         torus_grid(cell, 7).unwrap(cell).plain(0)
+
+
+def as_servers_write(point):
+    shown = ", ".join(f"{number:.4g}" for number in point[:6])
+    return f"({shown}, ...)" if len(point) > 6 else f"({shown})"
+
+
+@pytest.mark.parametrize("name", LATTICES)
+def test_places_are_named_in_plain_coordinates(name, rng):
+    cell = oracles.PeriodicCell(LATTICES[name])
+    d = cell.dimension
+    x = cell.coordinates(cell.embed(rng.random((50, d)) @ cell.lattice))
+    points = cell.embed(x)
+    solid = cell.solid(waves(cell.lattice))
+    cut = cell.cut(waves(cell.lattice), labels=[1, 2], origin=0.1 * cell.lattice.sum(axis=0))
+    for oracle in (cell, solid, cut, cell.level_set(waves(cell.lattice))):
+        places = Places(oracle)
+        said = places.in_words(f"near {as_servers_write(points[7])}, on wall 1 (0, 1)", points)
+        plain = ", ".join(f"{number:.4g}" for number in x[7])
+        assert said == f"near ({plain}), on wall 1 (0, 1)"
+    # Where there is no vertex, what was written is all that there is, if it is whole.
+    text = f"at {as_servers_write(points[7])}"
+    said = places.in_words(text, points[:0])
+    if len(cell.radii) > 3:
+        assert said == text
+    else:
+        numbers = [float(number) for number in said[4:-1].split(", ")]
+        off = (numbers - x[7]) @ np.linalg.inv(cell.lattice)
+        assert np.abs(off - np.round(off)).max() < 1e-2
+
+
+def test_places_of_other_oracles_are_left_as_they_are():
+    class Plain:
+        dimension, ambient_dimension = 2, 3
+
+    text = "near (1, 2, 3)"
+    assert Places(Plain()).in_words(text, np.zeros((1, 3))) == text
+
+
+def test_an_incomplete_place_that_several_vertices_have_stays():
+    cell = oracles.PeriodicCell(LATTICES["triclinic"])
+    points = np.repeat(cell.embed([[0.1, 0.2, 0.3]]), 2, axis=0)
+    points[1, 6:] = -points[1, 6:]
+
+    class Told:
+        coordinates = staticmethod(lambda points: points[:, 6:8])
+
+    text = f"near {as_servers_write(points[0])}"
+    assert Places(Told()).in_words(text, points) == text
+    assert Places(Told()).in_words(text, points[:1]) != text

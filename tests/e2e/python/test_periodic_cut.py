@@ -2,6 +2,7 @@
 finite elements with periodic conditions find the known conductivity of a laminate."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -159,3 +160,22 @@ def test_what_cannot_be_cut_is_refused(server):
     plain = stellate.mesh(cell.solid(lambda x: np.cos(2 * np.pi * x[:, 0])), 0.12, server=server)
     with pytest.raises(stellate.InvalidArgument, match="not of this cell that is cut"):
         plain.unwrap(cell.cut())
+
+
+def test_a_refusal_and_a_report_name_places_in_plain_coordinates(server):
+    cell = oracles.PeriodicCell(np.eye(2))
+    stripe = lambda x: np.cos(2 * np.pi * x[:, 0])  # noqa: E731
+    wavy = lambda x: stripe(x) + 0.05 * np.sin(2 * np.pi * x[:, 1])  # noqa: E731
+    with pytest.raises(stellate.OracleError, match="walls 0 and 1 at 177.1 degrees") as refused:
+        stellate.mesh(cell.solid([stripe, wavy]), 0.05, server=server)
+    at = re.search(r"degrees, at \((\S+), (\S+)\);", str(refused.value))
+    assert np.abs(2 * (float(at[1]) - 0.25) - np.round(2 * (float(at[1]) - 0.25))) < 1e-3
+    assert np.abs(2 * float(at[2]) - np.round(2 * float(at[2]))) < 1e-3
+    oblique = lambda x: stripe(x) / 2 + np.sin(2 * np.pi * x[:, 1])  # noqa: E731
+    mesh = stellate.mesh(cell.solid([stripe, oblique]), 0.05, server=server)
+    sharpest = mesh.report.certificate.sharpest
+    assert mesh.certified and len(sharpest.point) == 2
+    assert (
+        np.abs([stripe(np.array([sharpest.point])), oblique(np.array([sharpest.point]))]).max()
+        < 1e-9
+    )

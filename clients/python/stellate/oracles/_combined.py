@@ -215,6 +215,8 @@ class LevelSet:
             )
         self.ambient_dimension = d = self._base.ambient_dimension
         self.about = about_of(self._base)
+        if callable(getattr(oracle, "coordinates", None)):
+            self.coordinates = oracle.coordinates
         self._values, self._gradient = UserFunction(f, "f", ("m",), str(d)), None
         if gradient is not None:
             self._gradient = UserFunction(gradient, "gradient", ("m", d), str(d))

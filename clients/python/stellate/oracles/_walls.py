@@ -114,6 +114,8 @@ class Clipped:
             self.bounding_box = self._base.bounding_box
         if self._base.has_intersect_flat and self.dimension < d:
             self.intersect_flat = oracle.intersect_flat
+        if callable(getattr(oracle, "coordinates", None)):
+            self.coordinates = oracle.coordinates
         if self._base.has_local_size:
             self.local_size = oracle.local_size
         self.thread_safe = bool(getattr(oracle, "thread_safe", False))
