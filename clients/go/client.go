@@ -2,6 +2,8 @@ package stellate
 
 import (
 	"context"
+	"crypto/rand"
+	"encoding/hex"
 	"errors"
 	"iter"
 	"log"
@@ -118,8 +120,8 @@ func call[Request, Reply any](ctx context.Context, o *outage, once bool, request
 
 func (c *Client) outage() *outage { return &outage{patience: c.patience} }
 
-// Create declares a mesh, which waits to be served. It is not repeated when the server is lost: whether
-// the mesh was made would not be known.
+// Create declares a mesh, which waits to be served. It is repeated when the server is lost: an id of its
+// own lets the server know the mesh again.
 func (c *Client) Create(ctx context.Context, oracle Oracle, epsilon float64, options *Options) (*pb.Mesh, error) {
 	if options == nil {
 		options = &Options{}
@@ -132,7 +134,12 @@ func (c *Client) Create(ctx context.Context, oracle Oracle, epsilon float64, opt
 }
 
 func (c *Client) create(ctx context.Context, spec *pb.MeshSpec) (*pb.Mesh, error) {
-	return call(ctx, c.outage(), true, &pb.CreateMeshRequest{Spec: spec}, c.stub.CreateMesh)
+	var id [16]byte
+	if _, err := rand.Read(id[:]); err != nil {
+		return nil, err
+	}
+	request := &pb.CreateMeshRequest{Spec: spec, MeshId: hex.EncodeToString(id[:])}
+	return call(ctx, c.outage(), false, request, c.stub.CreateMesh)
 }
 
 // Get is a mesh as it stands, without its geometry.

@@ -1,5 +1,8 @@
 #include "server/rpc/call.h"
 
+#include <exception>
+#include <new>
+
 #include "core/base/message.h"
 #include "server/base/log.h"
 #include "server/convert/error_map.h"
@@ -92,6 +95,17 @@ tl::expected<std::unique_ptr<MemoryBudget::Account>, grpc::Status> CountStream(
   const auto full = memory->Set(EstimateStreamBytes(session.request().spec, part));
   if (full) return tl::unexpected(Refuse(state, *full));
   return memory;
+}
+
+grpc::Status Guarded(const std::function<grpc::Status()>& handler) {
+  try {
+    return handler();
+  } catch (const std::bad_alloc&) {
+    return Refusal(v1::ERROR_REASON_LIMIT_EXCEEDED, "the server is out of memory");
+  } catch (const std::exception& error) {
+    Log(LogLevel::kError, {}, core::Message("a handler failed: ", error.what()));
+    return Refusal(v1::ERROR_REASON_INTERNAL, "a fault of the server: see its log");
+  }
 }
 
 grpc::Status NoRequest() {

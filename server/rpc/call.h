@@ -2,6 +2,7 @@
 
 #include <grpcpp/server_context.h>
 
+#include <functional>
 #include <memory>
 #include <string>
 #include <tl/expected.hpp>
@@ -59,6 +60,9 @@ tl::expected<std::shared_ptr<Session>, grpc::Status> DeclareMesh(const Call& cal
 // lives; or RESOURCE_EXHAUSTED.
 tl::expected<std::unique_ptr<MemoryBudget::Account>, grpc::Status> CountStream(
     ServerState& state, const Session& session, std::uint64_t part);
+
+// What `handler` returns: no exception leaves it.
+grpc::Status Guarded(const std::function<grpc::Status()>& handler);
 
 // INVALID_ARGUMENT: the call has ended without a valid request.
 grpc::Status NoRequest();

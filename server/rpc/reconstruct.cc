@@ -86,7 +86,15 @@ class UploadStream final : public ServerStream<v1::PointsChunk, v1::ReconstructR
     Leave();
   }
 
+  // Once the mesh is recorded.
   void Reply() {
+    const std::weak_ptr<UploadStream> self =
+        std::static_pointer_cast<UploadStream>(shared_from_this());
+    session()->ports().recorded->Then([self] {
+      if (const auto stream = self.lock()) stream->ReplyNow();
+    });
+  }
+  void ReplyNow() {
     const auto lock = Lock();
     reply_ = true;
     Pump();

@@ -9,7 +9,8 @@
 namespace stellate::server {
 
 // One function for each rpc, each in its own file. None of them waits for anything.
-grpc::Status CreateMesh(const Call& call, const v1::CreateMeshRequest& request, v1::Mesh* mesh);
+grpc::ServerBidiReactor<Incoming<v1::CreateMeshRequest>, v1::Mesh>* CreateMesh(
+    ServerState& state, grpc::CallbackServerContext* context);
 grpc::Status GetMesh(const Call& call, const v1::GetMeshRequest& request, v1::Mesh* mesh);
 grpc::Status ListMeshes(const Call& call, const v1::ListMeshesRequest& request,
                         v1::ListMeshesResponse* response);

@@ -2,14 +2,10 @@
 
 #include <google/protobuf/descriptor.h>
 
-#include <exception>
-#include <new>
 #include <optional>
 #include <utility>
 
 #include "core/base/message.h"
-#include "server/base/log.h"
-#include "server/convert/error_map.h"
 #include "server/rpc/rpcs.h"
 #include "stellate/v1/stellate.grpc.pb.h"
 
@@ -35,7 +31,7 @@ class UnaryCall final : public grpc::ServerBidiReactor<Request, Response> {
 
   void OnReadDone(bool ok) override {
     if (!ok) return this->Finish(NoRequest());
-    grpc::Status status = Answer();
+    grpc::Status status = Guarded([this] { return handler_(*call_, request_, &response_); });
     if (!status.ok()) return this->Finish(std::move(status));
     this->StartWriteAndFinish(&response_, grpc::WriteOptions(), std::move(status));
   }
@@ -43,18 +39,6 @@ class UnaryCall final : public grpc::ServerBidiReactor<Request, Response> {
   void OnDone() override { delete this; }
 
  private:
-  // No exception leaves a handler.
-  grpc::Status Answer() {
-    try {
-      return handler_(*call_, request_, &response_);
-    } catch (const std::bad_alloc&) {
-      return Refusal(v1::ERROR_REASON_LIMIT_EXCEEDED, "the server is out of memory");
-    } catch (const std::exception& error) {
-      Log(LogLevel::kError, {}, core::Message("a handler failed: ", error.what()));
-      return Refusal(v1::ERROR_REASON_INTERNAL, "a fault of the server: see its log");
-    }
-  }
-
   const Handler handler_;
   std::optional<Call> call_;
   Request request_;
@@ -88,7 +72,7 @@ void Rpcs::AddStream(const char* path, grpc::ServerBidiReactor<Request, Response
 }
 
 Rpcs::Rpcs(ServerState* state) : state_(*state) {
-  AddUnary("/stellate.v1.Stellate/CreateMesh", CreateMesh);
+  AddStream("/stellate.v1.Stellate/CreateMesh", CreateMesh);
   AddUnary("/stellate.v1.Stellate/GetMesh", GetMesh);
   AddUnary("/stellate.v1.Stellate/ListMeshes", ListMeshes);
   AddUnary("/stellate.v1.Stellate/CancelMesh", CancelMesh);

@@ -97,6 +97,7 @@ Session::Session(SessionOptions options, const MesherFactory& factory)
       journal->TakeAnswers(round, block, first, count);
     });
   }
+  if (ports().journal == nullptr || options_.record) ports().recorded->Happen();
   if (life_.now() != Life::kOver) return;
   end_ = options_.record->end;
   report_ = options_.record->result->report;
@@ -163,6 +164,8 @@ void Session::RunRounds(core::Mesher* mesher) {
   if (ports().journal != nullptr && !options_.record) {
     if (auto failure = ports().journal->WriteStart(request(), create_time_)) {
       FailBlameless(mesher, std::move(*failure));
+    } else {
+      ports().recorded->Happen();
     }
   }
   while (true) {
@@ -430,6 +433,7 @@ void Session::ShowEnd(const Ending& ending) {
   pool_.Close({blame_});
   if (intake_ != nullptr) intake_->Close(blame_);
   history_.WakeWatchers();
+  ports().recorded->Happen();  // also of a mesh that failed before it was recorded
 }
 
 // The mesh itself, in the place of the answers that led to it. Until then, or if the disk has no

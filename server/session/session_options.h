@@ -7,6 +7,7 @@
 
 #include "core/mesher.h"
 #include "core/report.h"
+#include "server/base/occasion.h"
 #include "server/memory/memory_budget.h"
 #include "server/oracles/oracle_pool.h"
 #include "server/session/session_journal.h"
@@ -40,6 +41,8 @@ struct SessionPorts {
   std::shared_ptr<MemoryBudget::Account> memory;  // may be null: its memory is not counted
   // Called when the replay is over, and again before Run is; may be empty.
   std::function<void()> on_replayed;
+  // Happens once the journal has the mesh, or will never have it: clients may hear of it then.
+  std::shared_ptr<Occasion> recorded = std::make_shared<Occasion>();
 };
 
 // What a session is made of, fixed for its life.

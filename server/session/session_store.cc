@@ -61,6 +61,9 @@ SessionStore::~SessionStore() { Stop(TimePoint::max()); }
 
 Allowed<std::shared_ptr<Session>> SessionStore::Create(SessionOptions options) {
   const std::lock_guard lock(mutex_);
+  if (const auto same = numbers_.find(options.request.name); same != numbers_.end()) {
+    return entries_.at(same->second).session;
+  }
   std::size_t running = 0, owned = 0, ending = 0;
   const auto count = [&](const Entry& entry) {
     if (entry.session->Over()) return;
@@ -96,7 +99,7 @@ Allowed<std::shared_ptr<Session>> SessionStore::Create(SessionOptions options) {
     return tl::unexpected(
         Refused({core::StatusCode::kFailedPrecondition, "the server is stopping"}));
   }
-  options.request.name = NewMeshName();
+  if (options.request.name.empty()) options.request.name = NewMeshName();
   if (new_journal_ && !options.examiner) options.ports.journal = new_journal_();
   Entry& entry = AddLocked(std::move(options), TimePoint::max());
   try {
@@ -113,6 +116,9 @@ Allowed<std::shared_ptr<Session>> SessionStore::Create(SessionOptions options) {
 }
 
 void SessionStore::Restore(SessionOptions options) {
+  // The earlier of two meshes of one name was deleted before the later was made, in the last
+  // instant of a server that was killed.
+  Delete(options.request.name);
   TimePoint over_since = TimePoint::max();
   if (options.record->end) {
     SessionEnd& end = *options.record->end;

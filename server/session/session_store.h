@@ -40,15 +40,16 @@ class SessionStore {
   explicit SessionStore(StoreLimits limits, Session::MesherFactory factory = core::Mesher::Create);
   ~SessionStore();
 
-  // Names the mesh and starts its thread. kLimitExceeded: too many meshes are running, or the
-  // system has no further thread.
+  // Names the mesh, unless it has a name, and starts its thread. Returns the mesh that has the name
+  // already, if one has. kLimitExceeded: too many meshes are running, or the system has no further
+  // thread.
   Allowed<std::shared_ptr<Session>> Create(SessionOptions options);
   // Before the first Create.
   void RecordIn(JournalFactory new_journal) { new_journal_ = std::move(new_journal); }
   // Restores a mesh that an earlier server recorded. REQUIRES: options.journal and options.record
-  // are set. A mesh that ended too long ago is deleted instead. A finished one is available
-  // immediately; others are replayed a few at a time, the oldest first, as the memory budget
-  // allows.
+  // are set; older ones come first. A mesh that ended too long ago is deleted instead. A finished
+  // one is available immediately; others are replayed a few at a time, the oldest first, as the
+  // memory budget allows.
   void Restore(SessionOptions options);
   std::shared_ptr<Session> Find(const std::string& name) const;  // null: none
   // Cancels and deletes a mesh; false if there is none.

@@ -145,6 +145,7 @@ SERVER = {
         "server/history",
         "server/oracles",
         "server/points",
+        "server/records",
         "server/session",
         "server/journal",
         "server/metrics",

@@ -21,6 +21,7 @@ import urllib.request
 import pytest
 import stellate
 from stellate import manifolds
+from stellate._reconnect import WAITS
 
 PATIENCE = 120.0  # seconds: for a hang, not for a measurement
 EPSILON = 0.15
@@ -284,6 +285,35 @@ def test_a_database_that_is_killed_moves_no_mesh(servers, undisturbed, database)
     assert sql(database, "SELECT term FROM stellate.cluster") == "1"
     assert not other.is_ready()
     assert "the database is back" in server.log()
+
+
+def test_a_mesh_is_declared_once_it_is_recorded(servers, monkeypatch):
+    monkeypatch.setitem(WAITS, "call", PATIENCE)
+    server = servers("first")
+    wait_for(server.is_ready)
+    declared: list[str] = []
+
+    def declare() -> None:
+        with stellate.Client(server.address, reconnect_seconds=PATIENCE) as client:
+            declared.append(client.create(manifolds.Torus(), EPSILON).name)
+
+    control("stop", "-m", "immediate")
+    try:
+        thread = threading.Thread(target=declare, daemon=True)
+        thread.start()
+        with stellate.Client(server.address) as client:
+            wait_for(lambda: list(client.list()))  # it is there, and waits
+        wait_for(lambda: not server.sees_database())
+        assert not declared
+    finally:
+        control("start")
+    thread.join(PATIENCE)
+    assert len(declared) == 1
+    server.end()  # a kill right after the reply takes nothing back
+    server.start()
+    wait_for(server.is_ready)
+    with stellate.Client(server.address) as client:
+        assert [info.name for info in client.list()] == declared
 
 
 def test_a_standby_of_the_database_takes_its_place(servers, undisturbed, database, tmp_path):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from typing import Any
 
@@ -117,24 +118,59 @@ class Token(Creating):
         self.judge("token-in-metadata", good, f"authorization: {said!r}", f"{wanted!r}")
 
 
+class Repeated(Creating):
+    """The reply is lost. A client may say so, or repeat its request so that there is one mesh."""
+
+    rules = ("repeated-by-its-id", "repeated-unchanged")
+
+    def __init__(self, *arguments: Any) -> None:
+        super().__init__(*arguments)
+        self._lost: Any = None
+
+    def create(self, request: Any, metadata: dict[str, str]) -> mesh_pb2.Mesh:
+        if self._lost is None:
+            self._lost = request
+            raise Refusal(grpc.StatusCode.UNAVAILABLE, "the kit lost the reply")
+        before, now = self._lost, request
+        good = now.mesh_id == before.mesh_id and re.fullmatch("[0-9a-f]{32}", now.mesh_id)
+        wanted = "the same 32 hexadecimal digits both times, or no second call"
+        came = f"mesh_id {before.mesh_id!r}, then {now.mesh_id!r}"
+        self.judge("repeated-by-its-id", bool(good), came, wanted)
+        same = now.spec == before.spec
+        self.judge("repeated-unchanged", same, "another spec", "the same spec both times")
+        return self.get()
+
+    def hear(self, answer: str) -> None:
+        good = agree(answer, "error unavailable")
+        for rule in self.rules:  # that are open still: nothing was repeated
+            self.judge(rule, good, f"`{answer}`", "`error unavailable`, or a second call")
+
+
+_TRANSIENT = (grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.CANCELLED)
+
+
 class Status(Creating):
-    """A refusal, and the error that it is shown as."""
+    """A refusal, and the error that it is shown as; or the mesh, where a client tries again."""
 
     def __init__(self, entry: Any, *arguments: Any) -> None:
         code = next(code for code in grpc.StatusCode if code.value[0] == entry["code"])
         self.name = "creator"
         self.rules = (f"status {code.name} {entry['reason']}".rstrip() + _about(entry),)
         super().__init__(*arguments)
-        self.entry = entry
+        self.entry, self._again = entry, False
         self.refusal = Refusal(code, entry["message"])
         self.refusal.details = bytes.fromhex(entry["details"])
 
     def create(self, request: Any, metadata: dict[str, str]) -> mesh_pb2.Mesh:
+        if self._again:
+            return self.get()
+        self._again = self.refusal.code in _TRANSIENT
         raise self.refusal
 
     def hear(self, answer: str) -> None:
         wanted = f"error {self.entry['class'].lower()} {self.entry['reason']}".strip()
-        self.judge(self.rules[0], agree(answer, wanted), f"`{answer}`", f"`{wanted}`")
+        made = self._again and agree(answer, f"created {self.mesh}")
+        self.judge(self.rules[0], made or agree(answer, wanted), f"`{answer}`", f"`{wanted}`")
 
 
 def _about(entry: Any) -> str:
@@ -160,7 +196,7 @@ class Field(Creating):
 
 
 def creator_scenarios(*arguments: Any) -> Iterator[Scenario]:
-    for kind in (Defaults, Seeds, Walls, Field):
+    for kind in (Defaults, Seeds, Walls, Field, Repeated):
         yield kind(*arguments)
     for entry in entries("errors.json")["statuses"]:
         yield Status(entry, *arguments)

@@ -2,6 +2,8 @@
 
 #include <chrono>
 #include <cstdio>
+#include <random>
+#include <stop_token>
 #include <utility>
 
 #include "net/channel.h"
@@ -12,6 +14,33 @@
 
 namespace stellate {
 namespace client {
+namespace {
+
+// 128 random bits in hexadecimal.
+std::string RandomId() {
+  std::random_device random;
+  std::string id;
+  for (int word = 0; word < 4; ++word) {
+    char digits[9];
+    std::snprintf(digits, sizeof digits, "%08x", random());
+    id += digits;
+  }
+  return id;
+}
+
+// Whether there is a server, once that is known: as the first call would find out.
+bool Reaches(grpc::Channel* channel) {
+  const auto deadline = std::chrono::system_clock::now() + kCallTime;
+  while (channel != nullptr) {
+    const grpc_connectivity_state state = channel->GetState(/*try_to_connect=*/true);
+    if (state == GRPC_CHANNEL_READY) return true;
+    if (state == GRPC_CHANNEL_TRANSIENT_FAILURE || state == GRPC_CHANNEL_SHUTDOWN) return false;
+    if (!channel->WaitForStateChange(state, deadline)) return false;
+  }
+  return false;
+}
+
+}  // namespace
 
 Expected<Request> Settle(const Host& host, Oracle& oracle, const MeshOptions& options) {
   Request request{options, ""};
@@ -43,18 +72,29 @@ void Tell(const std::string& epsilon_reason, Report* report) {
   report->text += std::string("      epsilon  ") + epsilon + ", " + epsilon_reason + "\n";
 }
 
-Expected<v1::Mesh> CreateMesh(v1::Stellate::Stub& stub, Oracle& oracle,
-                              const MeshOptions& options) {
+Expected<v1::Mesh> CreateMesh(v1::Stellate::Stub& stub, Oracle& oracle, const MeshOptions& options,
+                              const ReconnectPolicy& policy) {
   const Expected<v1::MeshSpec> spec = ToSpec(oracle, options);
   if (!spec) return tl::unexpected(spec.error());
-  grpc::ClientContext context;
-  context.set_deadline(std::chrono::system_clock::now() + kCallTime);
   v1::CreateMeshRequest request;
   *request.mutable_spec() = *spec;
-  v1::Mesh mesh;
-  const grpc::Status status = stub.CreateMesh(&context, request, &mesh);
-  if (!status.ok()) return tl::unexpected(FromStatus(status));
-  return mesh;
+  request.set_mesh_id(RandomId());
+  const bool is_there = Reaches(policy.channel.get());
+  Reconnector attempts(policy);
+  // What the attempt under way makes is wanted: it is cancelled by its name.
+  const std::stop_callback finish(options.stop, [&attempts] { attempts.Finish(); });
+  while (true) {
+    grpc::ClientContext& context = attempts.Attempt();
+    context.set_deadline(std::chrono::system_clock::now() + kCallTime);
+    v1::Mesh mesh;
+    const grpc::Status status = stub.CreateMesh(&context, request, &mesh);
+    if (status.ok()) {
+      attempts.Heard();
+      return mesh;
+    }
+    if (!is_there) return tl::unexpected(FromStatus(status));
+    if (!attempts.Again(status)) return tl::unexpected(attempts.Lost(status));
+  }
 }
 
 }  // namespace client
@@ -68,7 +108,9 @@ Expected<std::string> DeclareMesh(Oracle& oracle, const MeshOptions& options) {
   const Expected<client::Request> request = client::Settle(*host, oracle, options);
   if (!request) return tl::unexpected(request.error());
   const auto mesh =
-      client::CreateMesh(*v1::Stellate::NewStub(host->channel), oracle, request->options);
+      client::CreateMesh(*v1::Stellate::NewStub(host->channel), oracle, request->options,
+                         {options.connection.reconnect, host->channel, host->IsHopeless(),
+                          options.connection.on_outage});
   if (!mesh) return tl::unexpected(mesh.error());
   return mesh->name();
 }

@@ -2,6 +2,7 @@
 
 #include <string>
 
+#include "net/reconnect.h"
 #include "run/host.h"
 #include "stellate/client.h"
 #include "stellate/error.h"
@@ -26,8 +27,10 @@ void Take(const ChosenEpsilon& chosen, Request* request);
 // it was given.
 void Tell(const std::string& epsilon_reason, Report* report);
 
-// A new mesh, as the server says it. Not tried again when it fails: whether the server made the
-// mesh would not be known.
-Expected<v1::Mesh> CreateMesh(v1::Stellate::Stub& stub, Oracle& oracle, const MeshOptions& options);
+// A new mesh, as the server says it. Where a server that was reached is lost, the call is repeated
+// as `policy` has it: an id of its own lets the server know the mesh again. options.stop ends the
+// wait.
+Expected<v1::Mesh> CreateMesh(v1::Stellate::Stub& stub, Oracle& oracle, const MeshOptions& options,
+                              const ReconnectPolicy& policy);
 
 }  // namespace stellate::client

@@ -93,7 +93,9 @@ Expected<void> Run::Create() {
   // What no client could hold is refused before there is a mesh.
   auto builder = DeltaMesh::Create(oracle_.dimension(), oracle_.ambient_dimension());
   if (!builder) return tl::unexpected(builder.error());
-  const Expected<v1::Mesh> mesh = CreateMesh(*stub_, oracle_, options_);
+  ReconnectPolicy policy = Policy();
+  policy.on_outage = options_.connection.on_outage;
+  const Expected<v1::Mesh> mesh = CreateMesh(*stub_, oracle_, options_, policy);
   if (!mesh) return tl::unexpected(mesh.error());
   name_ = mesh->name();
   builder = DeltaMesh::Create(SimplexDimension(mesh->spec()), oracle_.ambient_dimension(),

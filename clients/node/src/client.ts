@@ -1,4 +1,5 @@
 // The service call by call, for those who need more than mesh().
+import { randomBytes } from "node:crypto";
 import { channelCredentials, type Credentials, staysOnThisMachine } from "./credentials.js";
 import { tokenInterceptor } from "./credentials.js";
 import { fromRpc, InvalidArgument, MeshNotFound, protocolError, StellateError } from "./errors.js";
@@ -82,8 +83,8 @@ export class Client {
   }
 
   /**
-   * Declares a mesh, which waits to be served. Not repeated when the server is lost: whether it made
-   * the mesh would not be known.
+   * Declares a mesh, which waits to be served. Repeated when the server is lost: an id of its own lets
+   * the server know the mesh again.
    */
   async create(oracle: Oracle, options: MeshOptions): Promise<MeshInfo> {
     return this.createFrom(this.specOf(oracle, options));
@@ -99,10 +100,10 @@ export class Client {
   /** As create(), in the protocol's own message. */
   async createFrom(spec: MeshSpec): Promise<MeshInfo> {
     const call: Unary<object, Mesh__Output> = this.stub.CreateMesh.bind(this.stub);
-    return infoFrom(await this.unary(call, { spec }, { once: true }));
+    return infoFrom(await this.unary(call, { spec, meshId: randomBytes(16).toString("hex") }));
   }
 
-  /** Declares a mesh of points, which waits for them. Not repeated, as create() is not. */
+  /** Declares a mesh of points, which waits for them. Not repeated: whether it made the mesh would not be known. */
   async declarePoints(points: CheckedPoints): Promise<MeshInfo> {
     try {
       const reply = await this.sendPoints([{ spec: points.spec }]);

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import secrets
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Any, Callable, TypeVar
 
@@ -101,14 +102,14 @@ class Client:
     def create(self, oracle: Any, epsilon: Epsilon, **options: Unpack[SpecOptions]) -> MeshInfo:
         """Declares a mesh, which waits to be served. epsilon and options: see stellate.mesh.
 
-        Not repeated when the server is lost: whether it made the mesh would not be known.
+        When the server is lost it is repeated: an id of its own lets the server know the mesh again.
         """
         checked = oracle if isinstance(oracle, CheckedOracle) else CheckedOracle(oracle)
         if options.get("speculative") is None and not stays_on_this_machine(self.address):
             options["speculative"] = True  # round trips are what a far server costs
         spec = mesh_spec(checked, choose(oracle, epsilon, self.check)[0], options)
-        request = pb.CreateMeshRequest(spec=spec)
-        return MeshInfo.from_wire(self._call(self._stub.CreateMesh, request, once=True))
+        request = pb.CreateMeshRequest(spec=spec, mesh_id=secrets.token_hex(16))
+        return MeshInfo.from_wire(self._call(self._stub.CreateMesh, request))
 
     def check(self, oracle: Any, epsilon: float | None = None, *, seed: int = 1) -> CheckReport:
         """Probes an oracle for its contract: see stellate.check."""

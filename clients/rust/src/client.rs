@@ -1,6 +1,8 @@
 //! The service call by call, for those who need more than `mesh`.
 
+use std::collections::hash_map::RandomState;
 use std::future::Future;
+use std::hash::{BuildHasher, Hasher};
 use std::sync::atomic::AtomicBool;
 use std::sync::Arc;
 use std::time::Duration;
@@ -154,8 +156,8 @@ impl Client {
         }
     }
 
-    /// Declares a mesh, which waits to be served. Not repeated when the server is lost: whether it made
-    /// the mesh would not be known.
+    /// Declares a mesh, which waits to be served. Repeated when the server is lost: an id of its own lets
+    /// the server know the mesh again.
     pub fn create(
         &self,
         oracle: &dyn Oracle,
@@ -170,8 +172,10 @@ impl Client {
     }
 
     pub(crate) fn create_from(&self, spec: MeshSpec) -> Result<MeshInfo, Error> {
-        let request = CreateMeshRequest { spec: Some(spec), ..Default::default() };
-        self.runtime.block_on(self.call(&mut self.outage(), true, |mut stub| {
+        let [high, low] = [(); 2].map(|()| RandomState::new().build_hasher().finish());
+        let mesh_id = format!("{high:016x}{low:016x}");
+        let request = CreateMeshRequest { spec: Some(spec), mesh_id, ..Default::default() };
+        self.runtime.block_on(self.call(&mut self.outage(), false, |mut stub| {
             let request = request.clone();
             async move { stub.create_mesh(request).await }
         }))

@@ -1,5 +1,6 @@
 // Requests to a live server, good and bad, through raw stubs.
 
+#include <filesystem>
 #include <limits>
 
 #include "server/base/version.h"
@@ -56,6 +57,65 @@ TEST_F(LiveRequestsTest, BadSpecificationsAreRefusedOneByOne) {
   // Nothing of it harmed the mesh beside.
   RawWorker worker(stub_.get(), other);
   EXPECT_EQ(WatchToEnd(other).state(), v1::MESH_STATE_SUCCEEDED);
+}
+
+TEST_F(LiveRequestsTest, AMeshIsDeclaredOnceUnderItsId) {
+  Config config;
+  config.data_dir = ::testing::TempDir() + "stellate-ids-" + std::to_string(getpid());
+  std::filesystem::remove_all(config.data_dir);
+  const std::string id = "0123456789abcdef0123456789abcdef", name = "meshes/" + id;
+  v1::MeshSpec spec = SpecOfSphere();
+  spec.set_label("mine");
+  spec.mutable_limits()->set_worker_wait_seconds(77.1);
+  for (int servers = 0; servers < 2; ++servers) {  // the second finds it in the record
+    Start(config);
+    for (int times = 0; times < 2; ++times) {
+      v1::Mesh mesh;
+      const grpc::Status status = Create(spec, id, &mesh);
+      ASSERT_TRUE(status.ok()) << status.error_message();
+      EXPECT_EQ(mesh.name(), name);
+    }
+    v1::MeshSpec other = spec;
+    other.set_epsilon(0.31);
+    v1::Mesh mesh;
+    const grpc::Status status = Create(other, id, &mesh);
+    EXPECT_EQ(status.error_code(), StatusCode::INVALID_ARGUMENT) << status.error_message();
+    EXPECT_EQ(FieldIn(status), "mesh_id");
+    grpc::ClientContext context;
+    v1::ListMeshesResponse all;
+    ASSERT_TRUE(stub_->ListMeshes(&context, {}, &all).ok());
+    EXPECT_EQ(all.meshes_size(), 1);
+    if (servers == 0) server_.reset();
+  }
+  // What it became is what the client is told.
+  RawWorker worker(stub_.get(), name);
+  EXPECT_EQ(WatchToEnd(name).state(), v1::MESH_STATE_SUCCEEDED);
+  v1::Mesh mesh;
+  ASSERT_TRUE(Create(spec, id, &mesh).ok());
+  EXPECT_EQ(mesh.state(), v1::MESH_STATE_SUCCEEDED);
+  // A deleted one is declared anew.
+  grpc::ClientContext context;
+  v1::DeleteMeshRequest remove;
+  remove.set_name(name);
+  google::protobuf::Empty empty;
+  ASSERT_TRUE(stub_->DeleteMesh(&context, remove, &empty).ok());
+  ASSERT_TRUE(Create(spec, id, &mesh).ok());
+  EXPECT_EQ(mesh.state(), v1::MESH_STATE_WAITING);
+  server_.reset();
+  std::filesystem::remove_all(config.data_dir);
+}
+
+TEST_F(LiveRequestsTest, IdsThatAreNoneAreTold) {
+  Start();
+  for (const std::string& id :
+       {std::string("1"), std::string(31, 'a'), std::string(33, 'a'), std::string(32, 'A'),
+        std::string(32, 'g'), std::string(100'000, 'a'), "../" + std::string(29, 'a')}) {
+    v1::Mesh mesh;
+    const grpc::Status status = Create(SpecOfSphere(), id, &mesh);
+    EXPECT_EQ(status.error_code(), StatusCode::INVALID_ARGUMENT) << status.error_message();
+    EXPECT_EQ(FieldIn(status), "mesh_id");
+    EXPECT_LT(status.error_message().size(), 1000u);
+  }
 }
 
 TEST_F(LiveRequestsTest, NamesThatAreNoMeshAreTold) {

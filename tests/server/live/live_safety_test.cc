@@ -105,6 +105,17 @@ class LiveSafetyTest : public LiveServer {
   Config config_;
 };
 
+TEST_F(LiveSafetyTest, AnIdOfAnotherOwnersMeshIsTaken) {
+  StartWithTokens();
+  TokenClient alice = Plain(kAlice), bob = Plain(kBob);
+  const std::string name = CreateBy(&alice);
+  v1::Mesh mesh;
+  const grpc::Status status = bob.Create(&mesh, SpecOfSphere(), name.substr(7));
+  EXPECT_EQ(status.error_code(), StatusCode::INVALID_ARGUMENT) << status.error_message();
+  EXPECT_EQ(FieldIn(status), "mesh_id");
+  EXPECT_EQ(mesh.name(), "");
+}
+
 TEST_F(LiveSafetyTest, EveryCallNeedsAKnownToken) {
   StartWithTokens();
   TokenClient alice = Plain(kAlice);

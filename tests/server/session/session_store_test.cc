@@ -79,6 +79,79 @@ TEST(SessionStore, RefusesMoreThanItsLimitAndTakesMoreWhenOneEnds) {
   EXPECT_TRUE(store.Create(Options()));
 }
 
+TEST(SessionStore, HasOneMeshOfAName) {
+  SessionStore store({1, 10, 1h});
+  SessionOptions options = Options();
+  options.request.name = NewMeshName();
+  const std::string name = options.request.name;
+  SessionOptions again = Options(), other = Options();
+  again.request.name = name;
+  const auto made = *store.Create(std::move(options));
+  EXPECT_EQ(made->request().name, name);
+  const auto same = store.Create(std::move(again));
+  ASSERT_TRUE(same) << "one that is there takes no place: " << same.error().message;
+  EXPECT_EQ(*same, made);
+  EXPECT_FALSE(store.Create(std::move(other))) << "the limit still holds";
+}
+
+// Of a server that was killed as it deleted one and took another.
+TEST(SessionStore, OfTwoRecordedUnderANameTheLaterIsKept) {
+  class Remembering : public testing::BlankJournal {
+   public:
+    void Forget() override { forgotten = true; }
+    std::atomic<bool> forgotten{false};
+  };
+  SessionStore store({});
+  const std::string name = NewMeshName();
+  std::vector<std::shared_ptr<Remembering>> journals;
+  for (const char* label : {"earlier", "later"}) {
+    SessionOptions options = Options();
+    options.request.name = name;
+    options.request.label = label;
+    options.record.emplace();
+    journals.push_back(std::make_shared<Remembering>());
+    options.ports.journal = journals.back();
+    store.Restore(std::move(options));
+  }
+  EXPECT_TRUE(journals[0]->forgotten);
+  EXPECT_FALSE(journals[1]->forgotten);
+  EXPECT_EQ(store.Find(name)->request().label, "later");
+  EXPECT_EQ(store.All().size(), 1u);
+}
+
+// A journal that has a mesh once the test says so, or never will.
+class LateJournal : public testing::BlankJournal {
+ public:
+  std::optional<MeshFailure> WriteStart(const MeshRequest&,
+                                        std::chrono::system_clock::time_point) override {
+    return gate.get_future().get();
+  }
+  std::promise<std::optional<MeshFailure>> gate;
+};
+
+TEST(SessionStore, WhoWaitsForTheRecordHearsOfItOnce) {
+  for (const bool fails : {false, true}) {
+    SessionStore store({});
+    SessionOptions options = Options();
+    const auto journal = std::make_shared<LateJournal>();
+    store.RecordIn([journal] { return journal; });
+    const auto session = *store.Create(std::move(options));
+    Occasion& recorded = *session->ports().recorded;
+    std::promise<void> heard;  // throws the second time
+    recorded.Then([&heard] { heard.set_value(); });
+    EXPECT_FALSE(recorded.HasHappened());
+    std::optional<MeshFailure> failure;
+    if (fails) failure = MeshFailure{FailureReason::kJournalFull, "full"};
+    journal->gate.set_value(failure);
+    heard.get_future().wait();
+    EXPECT_TRUE(recorded.HasHappened());
+    EXPECT_EQ(session->View().state == SessionState::kFailed, fails);
+    bool now = false;
+    recorded.Then([&now] { now = true; });
+    EXPECT_TRUE(now) << "it has happened";
+  }
+}
+
 // A mesher that asks for one point, and is not destroyed before the test says so.
 class SlowToGo : public stellate::testing::StubMesher {
  public:

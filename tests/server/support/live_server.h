@@ -75,6 +75,15 @@ class LiveServer : public ::testing::Test {
     return stub_->CreateMesh(&context, request, mesh);
   }
 
+  // Under an id of the client's own.
+  grpc::Status Create(const v1::MeshSpec& spec, const std::string& id, v1::Mesh* mesh) {
+    grpc::ClientContext context;
+    v1::CreateMeshRequest request;
+    *request.mutable_spec() = spec;
+    request.set_mesh_id(id);
+    return stub_->CreateMesh(&context, request, mesh);
+  }
+
   std::string CreateSphere(double epsilon = 0.3) {
     v1::Mesh mesh;
     const grpc::Status status = Create(SpecOfSphere(epsilon), &mesh);

@@ -23,9 +23,10 @@ class TokenClient {
     stub_ = v1::Stellate::NewStub(grpc::CreateCustomChannel(address, credentials, arguments));
   }
 
-  grpc::Status Create(v1::Mesh* mesh, const v1::MeshSpec& spec) {
+  grpc::Status Create(v1::Mesh* mesh, const v1::MeshSpec& spec, const std::string& id = "") {
     v1::CreateMeshRequest request;
     *request.mutable_spec() = spec;
+    request.set_mesh_id(id);
     return stub_->CreateMesh(Context().get(), request, mesh);
   }
   grpc::Status Get(const std::string& name, v1::Mesh* mesh) {

@@ -1,5 +1,7 @@
 # frozen_string_literal: true
 
+require 'securerandom'
+
 module Stellate
   # TLS, and a token, for a server that wants them. Files are PEM; all may be left out.
   #   token: sent with every call; over plain text only within this machine
@@ -59,8 +61,8 @@ module Stellate
       @patience = Patience.new(reconnect_seconds, method(:connect), -> { own&.why_gone }, on_outage, false)
     end
 
-    # Declares a mesh, which waits to be served; options as for Stellate.mesh. Not repeated when the server
-    # is lost: whether it made the mesh would not be known.
+    # Declares a mesh, which waits to be served; options as for Stellate.mesh. Repeated when the server is
+    # lost: an id of its own lets the server know the mesh again.
     def create(oracle, epsilon:, **options)
       create_from(spec(oracle, epsilon, options))
     end
@@ -73,7 +75,7 @@ module Stellate
 
     # As `create`, in the protocol's own message.
     def create_from(spec)
-      call(:create_mesh, V1::CreateMeshRequest.new(spec:), once: true)
+      call(:create_mesh, V1::CreateMeshRequest.new(spec:, mesh_id: SecureRandom.hex(16)))
     end
 
     # A mesh as it stands, without its geometry.

@@ -9,7 +9,9 @@ import io.grpc.netty.shaded.io.netty.channel.EventLoopGroup;
 import io.grpc.netty.shaded.io.netty.channel.epoll.EpollDomainSocketChannel;
 import io.grpc.netty.shaded.io.netty.channel.epoll.EpollEventLoopGroup;
 import io.grpc.netty.shaded.io.netty.channel.unix.DomainSocketAddress;
+import java.security.SecureRandom;
 import java.util.ArrayList;
+import java.util.HexFormat;
 import java.util.Iterator;
 import java.util.List;
 import java.util.concurrent.TimeUnit;
@@ -156,8 +158,8 @@ public final class Client implements AutoCloseable {
   }
 
   /**
-   * Declares a mesh, which waits to be served. Not repeated when the server is lost: whether it
-   * made the mesh would not be known.
+   * Declares a mesh, which waits to be served. Repeated when the server is lost: an id of its own
+   * lets the server know the mesh again.
    */
   public stellate.v1.Mesh create(Oracle oracle, double epsilon, Options options) {
     return create(spec(new CheckedOracle(oracle), epsilon, options));
@@ -168,8 +170,14 @@ public final class Client implements AutoCloseable {
   }
 
   stellate.v1.Mesh create(MeshSpec spec) {
-    CreateMeshRequest request = CreateMeshRequest.newBuilder().setSpec(spec).build();
-    return call(once(), now -> now.createMesh(request));
+    byte[] id = new byte[16];
+    new SecureRandom().nextBytes(id);
+    CreateMeshRequest request =
+        CreateMeshRequest.newBuilder()
+            .setSpec(spec)
+            .setMeshId(HexFormat.of().formatHex(id))
+            .build();
+    return call(outage(), now -> now.createMesh(request));
   }
 
   /** A mesh as it stands, without its geometry. */
