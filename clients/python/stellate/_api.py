@@ -74,6 +74,7 @@ def mesh(
     checkpoint: str | os.PathLike[str] | None = None,
     save: Path | Sequence[Path] = (),
     keep: Keep | None = None,
+    scale: Any = None,
     keep_on_server: bool = False,
     **options: Unpack[MeshOptions],
 ) -> FinishedMesh:
@@ -101,6 +102,11 @@ def mesh(
       keep: "box": what lies in the oracle's bounding box, cut at its sides where the manifold leaves
         it; "seeds": the components that seeds lie on, and no other. What is meshed is
         oracles.kept(oracle, keep, seeds): workers that join have to serve that.
+      scale: (d,) positive lengths, about how far the manifold goes along each axis, where axes have
+        different units: M is meshed in the coordinates x / scale. `epsilon`, all other lengths and the
+        report's are of these, sizes and angles, too; the oracle is asked, and points, places and
+        seeds are, in its own coordinates. What is meshed is oracles.in_units(oracle, scale), which says of
+        which oracles there is one: workers that join have to serve that, and a server shows it.
       keep_on_server: a finished mesh stays on `server`, as the mesh's `name`, for stellate.download and
         viewers, until somebody deletes it or the server's `keep-finished-seconds`, an hour by default,
         are over, or its `keep-finished-meshes` newer ones are there.
@@ -154,6 +160,7 @@ def mesh(
                 on_progress,
                 options,
                 keep=keep,
+                scale=scale,
                 every=False,
                 checkpoint=kept,
                 stays=keep_on_server,
@@ -183,6 +190,7 @@ def watch(
     on_progress: OnProgress | None = None,
     credentials: Credentials | None = None,
     keep: Keep | None = None,
+    scale: Any = None,
     **options: Unpack[MeshOptions],
 ) -> Iterator[Mesh]:
     """The mesh as it grows: an iterator over Mesh, the last of which is a FinishedMesh.
@@ -193,10 +201,13 @@ def watch(
     """
     if credentials is not None:
         with _connect(server, credentials) as client:
-            yield from watch(oracle, epsilon, client, on_progress, keep=keep, **options)
+            yield from watch(
+                oracle, epsilon, client, on_progress, keep=keep, scale=scale, **options
+            )
         return
     if isinstance(oracle, str):
-        given = [*options, *(["keep"] if keep is not None else [])]
+        named = {"keep": keep, "scale": scale}
+        given = [*options, *(name for name, value in named.items() if value is not None)]
         if given:
             raise TypeError(f"a mesh that exists already takes no {', '.join(given)}")
         yield from _watch_by_name(oracle, server, on_progress)
@@ -204,7 +215,7 @@ def watch(
     if epsilon is None:
         raise TypeError("watch() needs epsilon, a length or 'auto', to mesh an oracle's manifold")
     interrupts = Interrupts()
-    with Run(oracle, epsilon, server, on_progress, options, keep=keep) as session:
+    with Run(oracle, epsilon, server, on_progress, options, keep=keep, scale=scale) as session:
         interrupts.on_first = session.interrupt
         meshes = iter(session)
         while True:

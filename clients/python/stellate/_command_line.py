@@ -28,7 +28,7 @@ from ._command_oracle import CommandOracle
 from ._complex import Complex
 from ._credentials import Credentials
 from ._download import Unfinished
-from ._oracle_source import Refused, add_oracle, name_of, oracle_of
+from ._oracle_source import Refused, add_oracle, name_of, oracle_of, scaled_oracle_of
 from ._reconnect import WAITS
 from ._saved import SavedMesh
 from ._version import __version__
@@ -154,7 +154,7 @@ def _mesh(options: argparse.Namespace) -> int:
                 oracle, options.epsilon,
                 None if options.server is None else stack.enter_context(_connected(options)),
                 _bar(options), save=options.output, label=label, checkpoint=options.checkpoint,
-                keep_on_server=options.keep, **settings,
+                keep_on_server=options.keep, scale=options.scale, **settings,
             )  # fmt: skip
         if options.keep:
             print(f"stellate: it stays on {options.server} as {made.name}", file=sys.stderr)
@@ -173,7 +173,7 @@ def _short(label: str) -> str:
 
 
 def _declare(options: argparse.Namespace) -> int:
-    oracle, settings = oracle_of(options), _settings(options)
+    oracle, settings = scaled_oracle_of(options), _settings(options)
     label = options.label or _short(name_of(options))
     with _connected(options) as client:
         print(client.create(oracle, options.epsilon, label=label, **settings).name)
@@ -181,7 +181,7 @@ def _declare(options: argparse.Namespace) -> int:
 
 
 def _serve(options: argparse.Namespace) -> int:
-    oracle = oracle_of(options)
+    oracle = scaled_oracle_of(options)
     more = {"worker": options.worker, "max_chunk": options.max_chunk}
     with _connected(options) as client:
         if isinstance(oracle, CommandOracle):
@@ -218,7 +218,7 @@ def _download(options: argparse.Namespace) -> int:
 
 
 def _doctor(options: argparse.Namespace) -> int:
-    oracle = oracle_of(options)
+    oracle = scaled_oracle_of(options)
     with _connected(options) as client:
         report = client.check(oracle, options.epsilon, seed=options.seed)
     print(report)

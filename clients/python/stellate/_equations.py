@@ -65,6 +65,11 @@ class Equations:
         # and what F makes of that is a small multiple.
         self.tolerance = max(1e-12 * scale, 16 * float(np.finfo(float).eps) * largest)
 
+    @property
+    def functions(self) -> tuple[UserFunction, UserFunction | None]:
+        """F, and its Jacobian where it was given."""
+        return self._f, self._given
+
     def values(self, x: np.ndarray) -> np.ndarray:
         """F at the rows of x."""
         if not len(x):

@@ -11,6 +11,7 @@ from typing import Any
 from ._command_oracle import CommandOracle
 from ._pipe.greeting import parse_box, parse_points
 from .errors import StellateError
+from .oracles import in_units
 
 _OF_COMMANDS = ("oracle_processes", "dimension", "ambient_dimension", "box", "seeds",
                 "oracle_start", "oracle_silence")  # fmt: skip
@@ -57,6 +58,11 @@ def add_oracle(to: argparse.ArgumentParser, named: bool | None = None) -> None:
             help="an oracle, or what makes one; or, instead of it, a command",
         )  # fmt: skip
     to.set_defaults(oracle=None)
+    to.add_argument(
+        "--scale", metavar="S1,S2,...", type=_scale,
+        help="where axes have different units: how far the manifold goes along each; --epsilon and all "
+        "other lengths are then of coordinates divided by these, points and places are not",
+    )  # fmt: skip
     group = to.add_argument_group(
         "oracle command", "a program in any language that answers batches of queries"
     )
@@ -89,6 +95,21 @@ def add_oracle(to: argparse.ArgumentParser, named: bool | None = None) -> None:
         "--oracle-silence", type=float, metavar="SECONDS",
         help="that it may neither read nor write while it answers a batch; default: 600",
     )  # fmt: skip
+
+
+def _scale(text: str) -> list[float]:
+    try:
+        return [float(part) for part in text.split(",")]
+    except ValueError:
+        raise argparse.ArgumentTypeError(
+            f"has to be lengths, one for each axis, as .01,500,1, and is '{text}'"
+        ) from None
+
+
+def scaled_oracle_of(options: argparse.Namespace) -> Any:
+    """The oracle in the coordinates that --scale says. Raises: Refused; StellateError."""
+    oracle = oracle_of(options)
+    return oracle if options.scale is None else in_units(oracle, options.scale)
 
 
 def name_of(options: argparse.Namespace) -> str:

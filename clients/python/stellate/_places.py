@@ -13,7 +13,8 @@ from .errors import StellateError
 from .report import Report
 
 _NUMBER = r"-?(?:\d+\.?\d*(?:e[+-]?\d+)?)"
-_POINT = re.compile(rf"\(({_NUMBER}(?:, {_NUMBER})+)(, \.\.\.)?\)")
+# As servers write them, and as oracles do, which show them whole: "[0.5, 1.0]".
+_POINT = re.compile(rf"\(({_NUMBER}(?:, {_NUMBER})+)(, \.\.\.)?\)|\[({_NUMBER}(?:, {_NUMBER})+)\]")
 _ROUNDED = 1e-3  # of the largest coordinate: servers write four digits
 _MOST_SHOWN = 6  # coordinates, as servers write them
 
@@ -59,7 +60,9 @@ class Places:
             return text
 
         def plain(match: re.Match[str]) -> str:
-            said = np.array([float(number) for number in match[1].split(", ")])
+            said = np.array([float(number) for number in (match[1] or match[3]).split(", ")])
+            if match[3]:
+                return _listed(self._plain(said[None])[0]) if len(said) == d else match[0]
             if len(said) != min(d, _MOST_SHOWN) or bool(match[2]) != (d > _MOST_SHOWN):
                 return match[0]
             there = self._plain(points[self._at(said, points)])
@@ -83,3 +86,7 @@ class Places:
             return points
         found = np.asarray(self._coordinates(points), dtype=np.float64)
         return np.where(np.abs(found) < 1e-12 * np.abs(found).max(initial=1.0), 0.0, found)
+
+
+def _listed(point: np.ndarray) -> str:
+    return "[" + ", ".join(f"{number:.6g}" for number in point) + "]"

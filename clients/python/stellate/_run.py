@@ -16,6 +16,7 @@ from ._findings import CheckReport
 from ._follow import Following, OnProgress
 from ._mesh import FinishedMesh, Mesh
 from ._places import Places
+from ._scale import Scale
 from ._shared import table
 from ._wire.spec import mesh_spec
 from ._worker import Ask, answer, check_max_chunk, join_all
@@ -123,12 +124,14 @@ class Run:
         options: Mapping[str, Any],
         *,
         keep: Keep | None = None,
+        scale: Any = None,
         every: bool = True,
         checkpoint: Checkpoint | None = None,
         ask: Ask = answer,
         stays: bool = False,
     ) -> None:
-        """`keep`: see oracles.kept.
+        """`keep`: see oracles.kept. `scale`: see oracles.in_units; what comes out is in the oracle's own
+        coordinates.
 
         `stays`: a finished mesh is not deleted from its server, and says by what name it is there.
 
@@ -147,7 +150,11 @@ class Run:
                 f"and is {on_progress!r}"
             )
         max_chunk = check_max_chunk(options.pop("max_chunk", None))
-        self._places = Places(oracle)
+        self._scale: Scale | None = None
+        if scale is not None:
+            self._scale = Scale(scale, CheckedOracle(oracle).ambient_dimension)
+            oracle, options = self._scale.oracle(oracle), self._scale.options(options)
+        self._places, self._d = Places(oracle), CheckedOracle(oracle).ambient_dimension
         if keep is not None:
             oracle = part_of(oracle, keep, options.get("seeds"))
         checked = CheckedOracle(oracle)
@@ -158,14 +165,16 @@ class Run:
         self._on_progress, self._checkpoint, self._stays = on_progress, checkpoint, stays
         self._epsilon_reason = ""
         self._where_it_ends: Callable[[], str] | None = getattr(oracle, "where_it_ends", None)
-        chosen = self._say(
-            choice(
+        try:
+            choice_made = choice(
                 oracle,
                 epsilon,
                 lambda it: _check(it, server),
                 lambda text: _note(on_progress, text),
             )
-        )
+        except StellateError as error:
+            raise self._in_own_words(error)  # noqa: B904, it is the same one
+        chosen = self._say(choice_made)
         kept = checkpoint.retries if checkpoint is not None else None
         most = table("auto.toml")["retries"] if kept is None else kept
         self._retries = most if self._epsilon_reason else 0
@@ -295,18 +304,18 @@ class Run:
                 if self._every or self._next is None:
                     yield mesh
         except StellateError as error:
+            self._in_own_words(error)  # by the mesh as the server has it
             if isinstance(error.mesh, Mesh):  # the server says that it is over
                 error.mesh = mesh = self._told(error.mesh)
                 full = error.reason.startswith("JOURNAL_")  # with more room it goes on
                 if self._checkpoint is not None and not full:
                     self._checkpoint.forget()  # it would fail again
             if not self._interrupted:
-                error = self._places.in_error(error, self._at_work.info.ambient_dimension)
                 raise self._best_reason(error) from None
         if self._interrupted:
             raise self._interruption(mesh)
         if self._failure is not None and not self._ended:
-            raise self._failure from None
+            raise self._in_own_words(self._failure) from None
         return mesh
 
     def _finish(self, mesh: FinishedMesh) -> None:
@@ -319,9 +328,16 @@ class Run:
         ours = self._failure
         if ours is None:
             return error
+        self._in_own_words(ours)
         if isinstance(ours, StellateError):
             ours.mesh = error.mesh
         return ours
+
+    def _in_own_words(self, error: BaseException) -> BaseException:
+        """With its places in the coordinates that people know them by."""
+        if isinstance(error, StellateError):
+            return self._places.in_error(error, self._d)
+        return error
 
     def interrupt(self) -> None:
         """From another thread: iterating ends as soon as it can, with Interrupted."""
@@ -337,7 +353,7 @@ class Run:
             self._at_work.following.stop()  # a server that is away cannot say how the mesh ends
 
     def _interruption(self, mesh: Mesh | None) -> Interrupted:
-        mesh = mesh or self._at_work.following.so_far()
+        mesh = mesh or self._told(self._at_work.following.so_far())
         size = f"{len(mesh.points):,} vertices"
         if self._ended:
             return Interrupted(f"the mesh was finished: {size}, the exception's mesh", mesh)
@@ -356,12 +372,15 @@ class Run:
     def _told(self, mesh: M) -> M:
         """With what the server does not know: why epsilon is what it is, where the oracle's manifold
         ends, and the coordinates that people know places by."""
+        points = mesh.points
         mesh = self._places.in_mesh(mesh)
+        if self._scale is not None:
+            mesh = self._scale.mesh(mesh)
         report = mesh.report
         if report is None:
             return mesh
         if self._where_it_ends is not None and report.termination == "NO_PROGRESS":
-            end = self._where_it_ends()
+            end = self._places.in_words(self._where_it_ends(), points)
             if end:
                 report = report.refused(f"{end}. The run ended as NO_PROGRESS")
         if self._epsilon_reason:

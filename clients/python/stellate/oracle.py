@@ -61,6 +61,7 @@ class Oracle(Protocol):
         angle and refusals then name places in these.
       bounding_box: (lower (d,), upper (d,)), where to look for M, or
       seeds: (m, d), points near M, one at least on each component. One of the two is needed.
+      in_units(scale (d,)) -> oracle: of {x / scale : x in M}, for stellate.mesh(..., scale=).
       thread_safe: True lets several workers call it at once.
       about: a str, one sentence that it says of itself, for people, such as what it was fitted with:
         the verdict ends with its first 300 characters, as the oracle's own words.

@@ -29,7 +29,7 @@ _SPEC.update(
 )
 _SERVING = set(types(MeshOptions)) - set(types(SpecOptions))  # keywords of stellate.mesh alone
 # Arguments with names of their own, which somebody may have meant.
-_NAMED = {"epsilon", "server", "on_progress", "credentials", "checkpoint", "save", "keep"}
+_NAMED = {"epsilon", "server", "on_progress", "credentials", "checkpoint", "save", "keep", "scale"}
 _AUDITS = {name: pb.Audit.Value(f"AUDIT_{name.upper()}") for name in get_args(Audit)}
 # The server asks for larger dihedral angles, and tries more candidates, where the bound is above
 # its default.
@@ -81,6 +81,8 @@ def mesh_spec(oracle: CheckedOracle, epsilon: float, options: Mapping[str, Any])
             raise TypeError(f"{name!r} is for who serves the mesh, not for declaring it")
         elif name == "keep":
             raise TypeError("'keep' is about the oracle: give oracles.kept(oracle, keep, seeds)")
+        elif name == "scale":
+            raise TypeError("'scale' is about the oracle: give oracles.in_units(oracle, scale)")
         else:
             raise TypeError(_unknown(name))
     return spec

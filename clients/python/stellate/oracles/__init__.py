@@ -19,6 +19,7 @@ from ._periodic import PeriodicCell
 from ._periodic_mesh import PeriodicMesh
 from ._quotient import Quotient
 from ._triangles import TriangleMesh
+from ._units import in_units
 from ._walls import Clipped, HalfSpace, ImplicitSolid, Solid
 
 __all__ = [
@@ -42,5 +43,6 @@ __all__ = [
     "Solid",
     "Transformed",
     "TriangleMesh",
+    "in_units",
     "kept",
 ]

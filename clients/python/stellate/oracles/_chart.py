@@ -11,6 +11,7 @@ import numpy as np
 from .._functions import Exactness, UserFunction
 from .._rows import Array
 from ..errors import InvalidArgument
+from ._units import After
 
 _STEP = 1e-4  # of second differences, in shares of the box: about the fourth root of rounding
 _FIRST_STEP = 6e-6  # of first differences: about its cube root
@@ -51,6 +52,11 @@ class Chart:
         self._exactness = Exactness(None, self.lower, self.upper)
         if self.derivative is not None:
             self._slopes = UserFunction(self.derivative, "a chart's derivative", ("d", k), str(k))
+
+    def in_units(self, scale: Array) -> Chart:
+        """The map into the coordinates x / scale."""
+        slopes = None if self.derivative is None else After(self._slopes, scale, slopes=True)
+        return Chart(After(self._values, scale), slopes, self.lower, self.upper, self.periodic)
 
     @property
     def extent(self) -> Array:

@@ -12,6 +12,7 @@ from .._derivatives import Library, with_derivatives
 from .._equations import Equations, Solution, solve
 from .._rows import apply, norms, product, transposed
 from ..errors import InvalidArgument, NotConverged, OracleError
+from ._units import Before, SlopeBefore
 
 _LOOKS = 64  # points that F is looked at from where none leads to M
 _FEW = 0.25  # of the first batch, fewer of which find M where something is wrong with F
@@ -90,6 +91,7 @@ class ImplicitManifold:
         self.local_size = local_size
         self.thread_safe = thread_safe
         self._max_iterations, self._looked = max_iterations, False
+        self._clipped: Any = None  # this manifold within its inequalities
         self._scale = float(np.linalg.norm(upper - lower))
         library = jacobian if isinstance(jacobian, str) else None
         if isinstance(jacobian, str):
@@ -104,7 +106,7 @@ class ImplicitManifold:
         """Becomes the manifold with boundary that the inequalities leave."""
         from ._walls import Clipped  # which imports what is made of this one
 
-        clipped = Clipped(copy.copy(self), inequalities, gradients=library)
+        self._clipped = clipped = Clipped(copy.copy(self), inequalities, gradients=library)
         self.walls: int = clipped.walls
         self.face_point = clipped.face_point
         self.clearances = clipped.clearances
@@ -185,6 +187,24 @@ class ImplicitManifold:
     def tangent_basis(self, points: np.ndarray) -> np.ndarray:
         """Orthonormal bases (n, d, k) of the null space of the Jacobian at points of M."""
         return self._null_space(self._equations.jacobian(np.asarray(points, dtype=float)))
+
+    def in_units(self, scale: np.ndarray) -> Any:
+        """The oracle of {x / scale : x in M}; see oracles.in_units."""
+        if self._clipped is not None:
+            return self._clipped.in_units(scale)
+        f, jacobian = self._equations.functions
+        lower, upper = self.bounding_box
+        return ImplicitManifold(
+            Before(f, scale),
+            None if jacobian is None else SlopeBefore(jacobian, scale),
+            ambient_dimension=self.ambient_dimension,
+            dimension=self.dimension,
+            bounding_box=(lower / scale, upper / scale),
+            seeds=None if self.seeds is None else np.asarray(self.seeds) / scale,
+            local_size=None if self.local_size is None else Before(self.local_size, scale),
+            max_iterations=self._max_iterations,
+            thread_safe=self.thread_safe,
+        )
 
     # Pieces.
 

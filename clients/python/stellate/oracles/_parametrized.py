@@ -93,6 +93,11 @@ class Parametrized(Projection):
             )
         return ""
 
+    def in_units(self, scale: Array) -> Parametrized:
+        """The oracle of {x / scale : x in M}; see oracles.in_units."""
+        charts = [chart.in_units(scale) for chart in self._charts]
+        return Parametrized(charts=charts, thread_safe=self.thread_safe)
+
     def _beyond(self, number: int) -> list[tuple[int, str, Array, Array]]:
         """Of each end of a chart's intervals: its name, samples there, and a step beyond each."""
         chart, found = self._charts[number], []

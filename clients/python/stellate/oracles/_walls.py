@@ -15,6 +15,7 @@ from ..errors import InvalidArgument
 from ..oracle import CheckedOracle
 from ._combined import LevelSet
 from ._common import refuse_walls, where_of
+from ._units import Before, SlopeBefore, in_units
 
 Wall = Callable[[Array], Any]
 
@@ -42,6 +43,11 @@ class Space:
         return np.broadcast_to(
             np.eye(self.dimension), (len(points), self.dimension, self.dimension)
         ).copy()
+
+    def in_units(self, scale: Array) -> Space:
+        """Space in the coordinates x / scale."""
+        lower, upper = self.bounding_box
+        return Space((lower / scale, upper / scale))
 
 
 class Clipped:
@@ -154,6 +160,10 @@ class Clipped:
             outward[:, i] = apply(bases, -along / np.where(steep > 0, steep, 1.0))
         return outward
 
+    def in_units(self, scale: Array) -> Clipped:
+        """The oracle of {x / scale : x in M}; see oracles.in_units."""
+        return ClippedInUnits(self, scale, self)
+
     def _independent(self, face: tuple[int, ...]) -> tuple[int, ...]:
         """Walls of a face from which all others of it follow, by the closures."""
         chosen: list[int] = []
@@ -226,6 +236,33 @@ class Clipped:
                 f"ball has to be a point of R^{self.ambient_dimension} and a radius"
             )
         self._add([_Ball(centre, radius)], None)
+
+
+class ClippedInUnits(Clipped):
+    """The same in the coordinates x / scale.
+
+    Args:
+      whole: it in x.
+      told: has its `clearances`, and `region_names` if they have any.
+    """
+
+    def __init__(self, whole: Clipped, units: Array, told: Any) -> None:
+        self._told, self._units = told, units
+        seeds = getattr(whole, "seeds", None)
+        super().__init__(
+            in_units(whole._oracle, units),
+            [Before(wall, units) for wall in whole._walls],
+            gradients=[g if g is None else SlopeBefore(g, units) for g in whole._gradients],
+            seeds=None if seeds is None else seeds / units,
+            labels=whole.labels,
+            closures=whole.closures,
+        )
+        self.thread_safe = whole.thread_safe
+        self.region_names = getattr(told, "region_names", ())
+
+    def clearances(self, points: Array) -> Array:
+        """(n, d) -> (n, walls): the walls' values."""
+        return np.asarray(self._told.clearances(points * self._units))
 
 
 class _Ball:

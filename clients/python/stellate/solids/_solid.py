@@ -10,6 +10,7 @@ import numpy as np
 from .._rows import Array
 from ..errors import InvalidArgument
 from ..oracles import Solid as WalledSolid
+from ..oracles._walls import ClippedInUnits
 from ._motions import Body, Grown, Motion, direction, length, turn_to, vector
 from ._signs import (
     All,
@@ -70,6 +71,10 @@ class ByWalls:
     def conormals(self, points: Array, face: tuple[int, ...]) -> Array:
         """(n, d) -> (n, len(face), d): outward unit normals of the walls."""
         return self._oracle.conormals(points, face)
+
+    def in_units(self, scale: Array) -> Any:
+        """The oracle of {x / scale : x in it}; see oracles.in_units."""
+        return ClippedInUnits(self._oracle, scale, self)
 
 
 class Solid(ByWalls):

@@ -1,0 +1,267 @@
+"""Axes of different units: what is meshed in x / scale is handed back in x."""
+
+import re
+
+import numpy as np
+import pytest
+import stellate
+from stellate import oracles, solids
+
+SCALE = np.array([0.01, 500.0, 1.0])
+
+
+def on_ellipsoid(x):
+    return ((x / SCALE) ** 2).sum(axis=1) - 1
+
+
+def ellipsoid(**more):
+    return stellate.ImplicitManifold(
+        on_ellipsoid,
+        ambient_dimension=3,
+        dimension=2,
+        bounding_box=(-1.3 * SCALE, 1.3 * SCALE),
+        **more,
+    )
+
+
+def sphere(**more):
+    return stellate.ImplicitManifold(
+        lambda y: (y * y).sum(axis=1) - 1,
+        ambient_dimension=3,
+        dimension=2,
+        bounding_box=([-1.3] * 3, [1.3] * 3),
+        **more,
+    )
+
+
+def certified(mesh):
+    certificate = mesh.report.certificate
+    assert mesh.certified, certificate.verdict
+    assert "coordinates were divided by " in certificate.verdict
+    assert "coordinates were divided by " in " ".join(str(mesh.report).split())
+    return certificate
+
+
+def test_an_ellipsoid_of_two_units_is_meshed_as_the_sphere_that_it_is(server):
+    mesh = stellate.mesh(ellipsoid(), 0.3, server=server, scale=SCALE)
+    certificate = certified(mesh)
+    assert (certificate.components, certificate.euler_characteristic) == (1, 2)
+    assert certificate.max_circumradius <= 0.3
+    np.testing.assert_allclose(on_ellipsoid(mesh.points), 0, atol=1e-9)
+    np.testing.assert_array_less(0.9 * SCALE, mesh.points.max(axis=0))
+    plain = stellate.mesh(sphere(), 0.3, server=server)
+    assert certificate.estimated_reach == pytest.approx(
+        plain.report.certificate.estimated_reach, rel=0.05
+    )
+
+
+def test_units_that_are_powers_of_two_change_no_bit(server):
+    units = np.array([2.0**-7, 512.0, 1.0])
+    wide = stellate.ImplicitManifold(
+        lambda x: ((x / units) ** 2).sum(axis=1) - 1,
+        ambient_dimension=3,
+        dimension=2,
+        bounding_box=(-1.3 * units, 1.3 * units),
+    )
+    scaled = stellate.mesh(wide, 0.3, server=server, scale=units)
+    plain = stellate.mesh(sphere(), 0.3, server=server)
+    np.testing.assert_array_equal(scaled.points, plain.points * units)
+    np.testing.assert_array_equal(scaled.simplices, plain.simplices)
+
+
+@pytest.mark.parametrize("given", [False, True])
+def test_seeds_are_in_the_oracles_own_coordinates(server, given):
+    seeds = [[0, 510.0, 0]]
+    oracle = ellipsoid() if given else ellipsoid(seeds=np.array(seeds))
+    more = {"seeds": seeds} if given else {}
+    certified(stellate.mesh(oracle, 0.4, server=server, scale=SCALE, box_seeds=0, **more))
+
+
+def test_the_jacobian_and_sizes_are_asked_in_own_coordinates(server):
+    asked = []
+
+    def size(x):
+        asked.append(np.abs(x).max(axis=0))
+        return np.full(len(x), 0.8)
+
+    oracle = ellipsoid(jacobian=lambda x: 2 * x / SCALE**2, local_size=size)
+    certificate = certified(stellate.mesh(oracle, 0.9, server=server, scale=SCALE, size_rate=0.5))
+    assert certificate.max_circumradius <= 0.4 * 1.01
+    np.testing.assert_array_less(np.max(asked, axis=0), 1.01 * SCALE)
+
+
+@pytest.mark.parametrize("way", ["inequalities", "clipped", "solid"])
+def test_walls_are_scaled(server, way):
+    def right(x):
+        return x[:, 0] - 0.002
+
+    if way == "inequalities":
+        oracle = ellipsoid(inequalities=[right])
+    elif way == "clipped":
+        oracle = oracles.Clipped(ellipsoid(), [right])
+    else:
+        oracle = stellate.ImplicitSolid(
+            lambda x: -on_ellipsoid(x),
+            bounding_box=(-1.3 * SCALE, 1.3 * SCALE),
+            inequalities=[right],
+        )
+    mesh = stellate.mesh(oracle, 0.35, server=server, scale=SCALE)
+    certified(mesh)
+    assert mesh.points[:, 0].min() == pytest.approx(0.002, rel=1e-9)
+    if way == "solid":
+        x, y, _ = mesh.report.certificate.sharpest.point
+        assert x == pytest.approx(0.002) and abs(y) < 500 and abs(y) > 1e-3
+
+
+def test_materials_keep_their_names(server):
+    low, high = -SCALE, SCALE
+    layers = solids.Labels(left=solids.Box(low, [0, 500, 1]), right=solids.Box([0, -500, -1], high))
+    mesh = stellate.mesh(layers, 0.7, server=server, scale=SCALE)
+    certified(mesh)
+    assert mesh.region_names == ("left", "right")
+    assert mesh.volume == pytest.approx(8 * SCALE.prod(), rel=1e-7)
+
+
+def test_charts_are_scaled(server):
+    ring = oracles.Parametrized(
+        lambda u: np.stack([0.01 * np.cos(u[:, 0]), 500 * np.sin(u[:, 0])], axis=1),
+        lambda u: np.stack([-0.01 * np.sin(u), 500 * np.cos(u)], axis=1),
+        [0],
+        [2 * np.pi],
+        True,
+    )
+    mesh = stellate.mesh(ring, 0.2, server=server, scale=[0.01, 500])
+    certified(mesh)
+    np.testing.assert_allclose(((mesh.points / [0.01, 500]) ** 2).sum(axis=1), 1, atol=1e-9)
+
+
+def test_one_unit_for_all_axes_will_do_for_any_oracle(server):
+    torus = stellate.manifolds.Torus()
+    mesh = stellate.mesh(torus, 0.07, server=server, scale=2)
+    np.testing.assert_allclose(mesh.points, torus.closest_point(mesh.points), atol=1e-12)
+    assert certified(mesh).max_circumradius <= 0.07
+    assert mesh.points[:, 0].max() == pytest.approx(1.4, abs=0.1)
+
+
+def test_an_oracle_may_scale_itself(server):
+    class Own:
+        dimension, ambient_dimension = 2, 3
+        bounding_box = -1.3 * SCALE, 1.3 * SCALE
+
+        def closest_point(self, points):
+            raise AssertionError("of the scaled one")
+
+        def in_units(self, scale):
+            np.testing.assert_array_equal(scale, SCALE)
+            return sphere()
+
+    mesh = stellate.mesh(Own(), 0.4, server=server, scale=SCALE)
+    certified(mesh)
+    np.testing.assert_allclose(on_ellipsoid(mesh.points), 0, atol=1e-9)
+
+
+def test_what_keeps_its_own_nearest_points_is_refused_with_the_cure(server):
+    with pytest.raises(stellate.InvalidArgument, match=r"points / scale.*in_units"):
+        stellate.mesh(stellate.manifolds.Torus(), 0.2, server=server, scale=[1, 2, 3])
+
+
+@pytest.mark.parametrize(
+    "scale",
+    [[1, 2], [1, -1, 1], [1, 0, 1], [1, np.nan, 1], [1, np.inf, 1], "x", True, [[1, 2, 3]], 0],
+)
+def test_a_bad_scale_is_refused(server, scale):
+    with pytest.raises(
+        stellate.InvalidArgument, match="scale has to be 3 positive numbers"
+    ) as raised:
+        stellate.mesh(ellipsoid(), 0.3, server=server, scale=scale)
+    assert "scale" in raised.value.details["fields"]
+
+
+def test_places_of_a_refusal_are_in_own_coordinates(server):
+    def thin_torus(x):
+        y = x / SCALE
+        return (np.hypot(y[:, 0], y[:, 1]) - 0.7) ** 2 + y[:, 2] ** 2 - 0.2**2
+
+    oracle = stellate.ImplicitManifold(
+        thin_torus, ambient_dimension=3, dimension=2, bounding_box=(-SCALE, SCALE)
+    )
+    mesh = stellate.mesh(oracle, 0.2, server=server, scale=SCALE)
+    verdict = mesh.report.certificate.verdict
+    assert not mesh.certified and "too coarse to trust" in verdict
+    place = re.search(r"at (\(.*?\)):", verdict)[1]
+    near = np.array([[float(number) for number in place.strip("()").split(",")]])
+    assert abs(thin_torus(near)[0]) < 1e-3
+    assert np.abs(near / SCALE - mesh.points / SCALE).max(axis=1).min() < 1e-3
+    assert place in " ".join(str(mesh.report).split())
+
+
+def test_places_of_an_error_are_in_own_coordinates(server):
+    squared = stellate.ImplicitManifold(
+        lambda x: on_ellipsoid(x) ** 2,
+        ambient_dimension=3,
+        dimension=2,
+        bounding_box=(-1.3 * SCALE, 1.3 * SCALE),
+    )
+    with pytest.raises(stellate.OracleError, match="touches zero") as raised:
+        stellate.mesh(squared, 0.2, server=server, scale=SCALE)
+    words = str(raised.value)
+    near = [float(n) for n in words[words.index("[") + 1 : words.index("]")].split(",")]
+    assert abs(on_ellipsoid(np.array([near]))[0]) < 0.01
+
+
+def test_growing_meshes_are_in_own_coordinates(server):
+    sizes = [
+        np.abs(mesh.points).max(axis=0)
+        for mesh in stellate.watch(ellipsoid(), 0.4, server, scale=SCALE)
+        if len(mesh.points)
+    ]
+    assert len(sizes) > 1
+    assert (np.array(sizes) < 1.01 * SCALE).all()
+
+
+def test_keep_cuts_at_the_box_of_own_coordinates(server):
+    sheet = stellate.ImplicitManifold(
+        lambda x: x[:, 2] - 0.2 * np.sin(x[:, 1] / 200),
+        ambient_dimension=3,
+        dimension=2,
+        bounding_box=(-SCALE, SCALE),
+    )
+    mesh = stellate.mesh(sheet, 0.3, server=server, scale=SCALE, keep="box")
+    certified(mesh)
+    np.testing.assert_allclose(mesh.points.max(axis=0)[:2], SCALE[:2], rtol=1e-9)
+    np.testing.assert_allclose(mesh.points.min(axis=0)[:2], -SCALE[:2], rtol=1e-9)
+
+
+def test_another_scale_is_another_mesh_to_a_checkpoint(tmp_path):
+    first = stellate.mesh(ellipsoid(), 0.4, scale=SCALE, checkpoint=tmp_path)
+    again = stellate.mesh(ellipsoid(), 0.4, scale=SCALE, checkpoint=tmp_path)
+    np.testing.assert_array_equal(first.points, again.points)
+    assert str(first.report) == str(again.report)
+    with pytest.raises(stellate.InvalidArgument):
+        stellate.mesh(ellipsoid(), 0.4, scale=1.01 * SCALE, checkpoint=tmp_path)
+
+
+def test_the_command_line_takes_a_scale(tmp_path, monkeypatch, capfd):
+    from stellate._command_line import main
+
+    (tmp_path / "states.py").write_text(
+        "import numpy as np, stellate\n"
+        "scale = np.array([0.01, 500.0, 1.0])\n"
+        "def ellipsoid():\n"
+        "    return stellate.ImplicitManifold(\n"
+        "        lambda x: ((x / scale) ** 2).sum(axis=1) - 1, ambient_dimension=3, dimension=2,\n"
+        "        bounding_box=(-1.3 * scale, 1.3 * scale))\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    given = ["states:ellipsoid", "-e", "0.4", "--scale", ".01,500,1"]
+    assert main(["mesh", *given, "-q", "-o", "mesh.txt"]) == 0
+    rows = (tmp_path / "mesh.txt").read_text().splitlines()
+    count = int(rows[0].split()[2])
+    points = np.array([row.split() for row in rows[1 : 1 + count]], dtype=float)
+    np.testing.assert_allclose(on_ellipsoid(points), 0, atol=1e-9)
+    assert main(["doctor", *given]) == 0
+    assert main(["mesh", *given[:-1], "1,2", "-q"]) == 2
+    assert "scale has to be 3 positive numbers" in capfd.readouterr().err
+    with pytest.raises(SystemExit):
+        main(["mesh", *given[:-1], "1;2", "-q"])
+    assert "one for each axis" in capfd.readouterr().err
