@@ -131,18 +131,6 @@ TextLayout Obj(const FileShape& shape) {
   return layout;
 }
 
-TextLayout Ply(const FileShape& shape) {
-  const bool curve = shape.groups[0].dimension == 1;
-  return {.head = "ply\nformat ascii 1.0\nelement vertex " + std::to_string(shape.vertices) +
-                  "\nproperty double x\nproperty double y\nproperty double z\nelement " +
-                  (curve ? "edge " : "face ") + std::to_string(shape.simplices()) +
-                  (curve ? "\nproperty int vertex1\nproperty int vertex2"
-                         : "\nproperty list uchar int vertex_indices") +
-                  "\nend_header\n",
-          .groups = {{"", curve ? "" : "3 "}},
-          .in_space = true};
-}
-
 TextLayout Msh(const FileShape& shape) {
   constexpr int kElementTypes[] = {15, 1, 2, 4};  // point, line, triangle, tetrahedron
   TextLayout layout{.head = "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n",

@@ -55,9 +55,11 @@ struct TextLayout {
 TextLayout Txt(const FileShape& shape);
 TextLayout Off(const FileShape& shape);
 TextLayout Obj(const FileShape& shape);
-TextLayout Ply(const FileShape& shape);
 TextLayout Msh(const FileShape& shape);  // Gmsh's, version 2.2
 std::unique_ptr<MeshWriter> MakeTextWriter(Draft draft, TextLayout layout);
+
+// Stanford's, binary, little endian, in double precision.
+std::unique_ptr<MeshWriter> MakePlyWriter(Draft draft, const FileShape& shape);
 
 // VTK's XML with raw appended data. `mesh` and its `groups`: of a file that has more than points
 // and simplices, which they then are whole; else null.

@@ -37,14 +37,15 @@ struct FileFormat {
 
 constexpr int kAny = 1 << 30;
 constexpr const char* kStl = ".stl";
+constexpr const char* kPly = ".ply";
 constexpr FileFormat kFormats[] = {
     {".txt", 0, kAny, kAny, "anything", Holds::kRows, client::Txt},
     {".off", 1, 2, kAny, "curves and surfaces, and the surfaces of solids in space", Holds::kDrawn,
      client::Off, true},
     {".obj", 1, 2, 3, "curves and surfaces, and the surfaces of solids in space", Holds::kPolygons,
      client::Obj, true},
-    {".ply", 1, 2, 3, "curves and surfaces, and the surfaces of solids in space", Holds::kDrawn,
-     client::Ply, true},
+    {kPly, 1, 2, 3, "curves and surfaces, and the surfaces of solids in space", Holds::kDrawn,
+     nullptr, true},
     {kStl, 2, 2, 3, "surfaces, and the surfaces of solids in space", Holds::kDrawn, nullptr, true},
     {".msh", 1, 3, 3, "simplices of dimension 3 at most", Holds::kGroups, client::Msh},
     {".vtu", 1, 3, kAny, "simplices of dimension 3 at most", Holds::kGroups, nullptr},
@@ -90,6 +91,7 @@ std::unique_ptr<MeshWriter> WriterOf(const FileFormat& format, client::Draft dra
                                      const std::vector<Group>* groups = nullptr) {
   if (format.layout != nullptr)
     return client::MakeTextWriter(std::move(draft), format.layout(shape));
+  if (format.ending == kPly) return client::MakePlyWriter(std::move(draft), shape);
   return client::MakeVtuWriter(std::move(draft), shape, mesh, groups);
 }
 

@@ -294,7 +294,7 @@ class Mesh:
         .txt  any k and d, exact: "k d nv ns", then nv lines of coordinates, then ns lines of ids.
         .off  any d (nOFF when d is not 3), k <= 2.
         .obj  curves and surfaces, d <= 3.
-        .ply  curves and surfaces, d <= 3.
+        .ply  curves and surfaces, d <= 3, binary, in double precision.
         .stl  surfaces of space, binary, in single precision as the format has it.
         .3mf  surfaces of space, for 3D printers, in millimetres: an object for each region.
         .glb  surfaces of space, for Blender and browsers: a node for each region, smooth normals and a

@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
@@ -130,18 +131,38 @@ TEST_F(MeshFile, CurvesOfThePlaneGetAThirdCoordinate) {
   mesh.simplices << 0, 1;
   EXPECT_EQ(Saved(mesh, "a.obj"), "v 1 0 0\nv 0 1 0\nl 1 2\n");
   const std::string ply = Saved(mesh, "a.ply");
-  EXPECT_NE(ply.find("element edge 1\nproperty int vertex1\nproperty int vertex2\nend_header\n"
-                     "1 0 0\n0 1 0\n0 1\n"),
-            std::string::npos)
-      << ply;
+  const std::string head =
+      "ply\nformat binary_little_endian 1.0\nelement vertex 2\nproperty double x\n"
+      "property double y\nproperty double z\nelement edge 1\nproperty int vertex1\n"
+      "property int vertex2\nend_header\n";
+  ASSERT_EQ(ply.substr(0, head.size()), head);
+  ASSERT_EQ(ply.size(), head.size() + 6 * sizeof(double) + 2 * sizeof(std::int32_t));
+  double points[6];
+  std::int32_t ids[2];
+  std::memcpy(points, ply.data() + head.size(), sizeof points);
+  std::memcpy(ids, ply.data() + head.size() + sizeof points, sizeof ids);
+  EXPECT_THAT(points, ::testing::ElementsAre(1, 0, 0, 0, 1, 0));
+  EXPECT_THAT(ids, ::testing::ElementsAre(0, 1));
 }
 
 TEST_F(MeshFile, PlyHoldsFaces) {
   const std::string text = Saved(Surface(3), "a.ply");
-  EXPECT_EQ(text.rfind("ply\nformat ascii 1.0\nelement vertex 4\n", 0), 0u);
-  EXPECT_NE(text.find("element face 4\nproperty list uchar int vertex_indices\n"),
-            std::string::npos);
-  ExpectEdgesCancel(LinesAfter(text, "3 "));
+  EXPECT_EQ(text.rfind("ply\nformat binary_little_endian 1.0\nelement vertex 4\n", 0), 0u);
+  const std::string last = "element face 4\nproperty list uchar int vertex_indices\nend_header\n";
+  const size_t points = text.find(last) + last.size();
+  const size_t rows = points + 12 * sizeof(double);
+  ASSERT_EQ(text.size(), rows + 4 * 13);
+  double first[3];
+  std::memcpy(first, text.data() + points, sizeof first);
+  EXPECT_EQ(first[0], Surface(3).points(0, 0));
+  std::vector<std::vector<int>> faces;
+  for (size_t at = rows; at < text.size(); at += 13) {
+    EXPECT_EQ(text[at], 3);
+    std::int32_t ids[3];
+    std::memcpy(ids, text.data() + at + 1, sizeof ids);
+    faces.push_back({ids[0], ids[1], ids[2]});
+  }
+  ExpectEdgesCancel(faces);
 }
 
 // The byte count and the bytes of a VTU data array that is inline, from base64.

@@ -145,9 +145,13 @@ def test_curve_as_obj_and_ply(tmp_path):
         sorted(a for a, _ in ends) == sorted(b for _, b in ends) == [1, 2, 3, 4, 5]
     )  # one way round
     shapes.polygon(5).save(tmp_path / "c.ply")
-    header, _, body = (tmp_path / "c.ply").read_text().partition("end_header\n")
-    assert "element vertex 5" in header and "element edge 5" in header
-    assert len(body.splitlines()) == 10
+    header, _, body = (tmp_path / "c.ply").read_bytes().partition(b"end_header\n")
+    assert b"binary_little_endian" in header
+    assert b"element vertex 5" in header and b"element edge 5" in header
+    points = np.frombuffer(body[: 5 * 24], "<f8").reshape(5, 3)
+    assert np.array_equal(points[:, :2], shapes.polygon(5).points) and not points[:, 2].any()
+    edges = np.frombuffer(body[5 * 24 :], "<i4").reshape(5, 2)
+    assert sorted(edges[:, 0]) == sorted(edges[:, 1]) == [0, 1, 2, 3, 4]
 
 
 def test_off_of_any_dimension(tmp_path):

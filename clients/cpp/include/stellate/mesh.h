@@ -79,7 +79,7 @@ struct Mesh {
   //         ids from zero, in the order of `simplices`
   //   .off  curves and surfaces; nOFF with all coordinates unless d = 3
   //   .obj  curves and surfaces, d <= 3, text
-  //   .ply  curves and surfaces, d <= 3, text
+  //   .ply  curves and surfaces, d <= 3, binary, in double precision
   //   .stl  surfaces of space, binary, in single precision as the format has it
   //   Of a solid (k = d = 3) these four hold the surface, outwards, around a cavity into that.
   //   .msh  k <= 3, d <= 3: Gmsh's, version 2.2, text

@@ -16,6 +16,7 @@ from .._complex import Complex
 from ..errors import SaveError
 from . import glb, layouts, meshio_formats, npz, three_mf
 from .groups import Group, groups, label_data
+from .ply import PlyWriter
 from .surface import boundary, drawn
 from .vtu import VtuWriter
 from .writing import Cells, MeshWriter, Shape, TextLayout, TextWriter, is_special, replaced
@@ -108,8 +109,8 @@ class Holds(enum.Enum):
 
 @dataclasses.dataclass(frozen=True)
 class _Format:
-    """What a file format can hold, and who writes it: we, by a layout of text, as .vtu or whole, or
-    meshio."""
+    """What a file format can hold, and who writes it: we, by a layout of text, as .vtu or .ply or whole,
+    or meshio."""
 
     least_dimension: int
     largest_dimension: int
@@ -118,6 +119,7 @@ class _Format:
     holds: Holds = Holds.GROUPS
     layout: Callable[[Shape], TextLayout] | None = None
     is_vtu: bool = False
+    is_ply: bool = False
     contents: Callable[[Complex], bytes] | None = None
     meshio: meshio_formats.MeshioFormat | None = None
     surface_of_solids: bool = False  # in space, besides what it holds
@@ -131,12 +133,14 @@ class _Format:
     @property
     def streams(self) -> bool:
         """Whether points and cells of one group are written in the order in which they come."""
-        return self.is_vtu or self.layout is not None
+        return self.is_vtu or self.is_ply or self.layout is not None
 
     def writer(self, file: BinaryIO, shape: Shape, mesh: Complex | None = None) -> MeshWriter:
         """`mesh`: of a file that has more than points and simplices, which they then are whole."""
         if self.layout is not None:
             return TextWriter(file, self.layout(shape))
+        if self.is_ply:
+            return PlyWriter(file, shape)
         if mesh is None:
             return VtuWriter(file, shape)
         return VtuWriter(file, shape, mesh.walls, _cell_data(mesh))
@@ -272,7 +276,7 @@ _FORMATS = {
         1, 2, 3, f"{_LOW}, {_SOLIDS}", Holds.POLYGONS, layouts.obj, surface_of_solids=True
     ),
     ".ply": _Format(
-        1, 2, 3, f"{_LOW}, {_SOLIDS}", Holds.DRAWN, layouts.ply, surface_of_solids=True
+        1, 2, 3, f"{_LOW}, {_SOLIDS}", Holds.DRAWN, is_ply=True, surface_of_solids=True
     ),
     ".stl": _Format(2, 2, 3, f"surfaces, {_SOLIDS}", contents=_stl, surface_of_solids=True),
     ".3mf": _Format(2, 2, 3, f"surfaces, {_SOLIDS}", contents=_three_mf, surface_of_solids=True),

@@ -25,18 +25,6 @@ def obj(shape: Shape) -> TextLayout:
     return TextLayout("", groups, point_prefix="v ", in_space=True, first_id=1)
 
 
-def ply(shape: Shape) -> TextLayout:
-    curve = shape.groups[0].dimension == 1
-    cells = (
-        f"element edge {shape.simplices}\nproperty int vertex1\nproperty int vertex2\n"
-        if curve
-        else f"element face {shape.simplices}\nproperty list uchar int vertex_indices\n"
-    )
-    axes = "".join(f"property double {axis}\n" for axis in "xyz")
-    head = f"ply\nformat ascii 1.0\nelement vertex {shape.vertices}\n{axes}{cells}end_header\n"
-    return TextLayout(head, (("", "" if curve else "3 "),), in_space=True)
-
-
 def msh(shape: Shape) -> TextLayout:
     """Gmsh's format 2.2, which every version of it reads, and most others who read .msh."""
     element_types = (15, 1, 2, 4)  # point, line, triangle, tetrahedron
