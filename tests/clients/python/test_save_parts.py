@@ -191,6 +191,24 @@ def test_xdmf_pairs_have_regions_and_walls(tmp_path):
     assert len(list(tmp_path.iterdir())) == 3
 
 
+def test_facets_of_an_earlier_mesh_go(tmp_path):
+    halves().save(tmp_path / "a.xdmf")
+    assert (tmp_path / "a_facets.xdmf").exists()
+    shapes.torus().save(tmp_path / "a.xdmf")
+    assert [file.name for file in tmp_path.iterdir()] == ["a.xdmf"]
+    halves().save(tmp_path / "a.xdmf")
+    with pytest.raises(stellate.SaveError):  # which is not written
+        stellate.Mesh(np.eye(3), np.empty((0, 3), dtype=int)).save(tmp_path / "a.xdmf")
+    assert (tmp_path / "a_facets.xdmf").exists()
+
+
+def test_what_others_call_facets_stays(tmp_path):
+    mine = tmp_path / "a_facets.xdmf"
+    mine.write_text("<Xdmf>not a pair's</Xdmf>")
+    shapes.torus().save(tmp_path / "a.xdmf")
+    assert mine.read_text() == "<Xdmf>not a pair's</Xdmf>"
+
+
 def test_xdmf_of_the_plane_has_two_coordinates(tmp_path):
     square = stellate.Mesh(
         np.array([[0, 0], [1, 0], [0, 1], [1, 1.0]]), np.array([[0, 1, 2], [1, 2, 3]])

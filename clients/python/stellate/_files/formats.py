@@ -45,17 +45,22 @@ def check_save(path: str | os.PathLike[str], dimension: int, ambient_dimension: 
 def save(mesh: Complex, path: str) -> None:
     """Mesh.save."""
     form = _choose(path, mesh.dimension, mesh.ambient_dimension)
+    beside = stale = None
     with contextlib.ExitStack() as stack:
-        beside = None
-        pairs = form.meshio is not None and form.meshio.facets
-        if pairs and mesh.faces(mesh.dimension - 1) and not is_special(path):
+        if form.meshio is not None and form.meshio.facets and not is_special(path):
             root, ending = os.path.splitext(path)
-            beside = stack.enter_context(replaced(f"{root}_facets{ending}"))
+            facets = f"{root}_facets{ending}"
+            if mesh.faces(mesh.dimension - 1):
+                beside = stack.enter_context(replaced(facets))
+            elif meshio_formats.are_facets(facets):
+                stale = facets
         draft = stack.enter_context(replaced(path))
         if form.meshio is not None:
             meshio_formats.write(form.meshio, mesh, cells(mesh), draft, beside)
         else:
             form.write(mesh, draft)
+    if stale is not None:  # of the mesh that was there
+        os.unlink(stale)
 
 
 def save_txt(mesh: Complex, path: str) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import os
 from collections.abc import Mapping
 from typing import Any
 
@@ -116,6 +117,14 @@ def as_pair(mesh: Complex, cells: np.ndarray) -> tuple[Any, Any]:
     rows = np.concatenate([g.simplices for g in every])
     walls = {"wall": [tags.astype(np.int32)]}
     return whole, meshio.Mesh(points, [(CELLS[mesh.dimension - 1], rows)], cell_data=walls)
+
+
+def are_facets(path: str) -> bool:
+    """Whether a file is the second one of such a pair, as we write it."""
+    if not os.path.isfile(path):
+        return False
+    with open(path, "rb") as file:
+        return any(b'<Attribute Name="wall"' in line for line in file)
 
 
 def write(
