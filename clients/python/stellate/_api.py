@@ -17,6 +17,7 @@ from ._findings import CheckReport
 from ._follow import Following, OnProgress
 from ._interrupt import Interrupts, told
 from ._mesh import FinishedMesh, Mesh
+from ._notebook import calm_output
 from ._run import Run
 from ._saved import SavedMesh
 from .client import Client
@@ -141,7 +142,7 @@ def mesh(
     with contextlib.ExitStack() as stack:
         interrupts = stack.enter_context(Interrupts())
         if on_progress is None and somebody_looks_on(sys.stderr):
-            on_progress = stack.enter_context(Patience(sys.stderr))
+            on_progress = stack.enter_context(Patience(calm_output()))
         kept = None
         if checkpoint is not None:
             if server is not None:

@@ -79,8 +79,12 @@ class Following:
 
     def _note(self, progress: Progress) -> None:
         self._progress = progress
-        if self._on_progress is not None:
-            self._on_progress(progress)
+        if self._on_progress is None:
+            return
+        self._on_progress(progress)
+        look = getattr(self._on_progress, "look", None)  # a NotebookBar has
+        if callable(look):
+            look(self.so_far)
 
 
 def _sound(step: Callable[..., T], *arguments: Any) -> T:

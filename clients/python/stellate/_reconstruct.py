@@ -15,6 +15,7 @@ from ._files.formats import check_save
 from ._info import MeshInfo, unless_failed
 from ._interrupt import Interrupts
 from ._mesh import FinishedMesh
+from ._notebook import calm_output
 from ._points import CheckedPoints, Noise
 from ._upload import Upload
 from .client import Client
@@ -110,7 +111,7 @@ def reconstruct(
     with contextlib.ExitStack() as stack:
         interrupts = stack.enter_context(Interrupts())
         if on_progress is None and somebody_looks_on(sys.stderr):
-            on_progress = stack.enter_context(Patience(sys.stderr))
+            on_progress = stack.enter_context(Patience(calm_output()))
         client = server
         if not isinstance(client, Client):
             client = stack.enter_context(Client(client, credentials))

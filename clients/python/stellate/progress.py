@@ -9,6 +9,7 @@ import threading
 import time
 from typing import TextIO
 
+from ._notebook import NotebookBar, in_notebook
 from .report import Progress
 
 __all__ = ["ProgressBar", "progress_bar"]
@@ -82,14 +83,17 @@ class ProgressBar:
         return text
 
 
-def progress_bar(title: str = "", file: TextIO | None = None) -> ProgressBar:
+def progress_bar(title: str = "", file: TextIO | None = None) -> ProgressBar | NotebookBar:
     """A progress bar for `stellate.mesh(..., on_progress=stellate.progress_bar())`.
 
     Args:
       title: put before the bar.
-      file: where to; standard error by default. If it is no terminal, a line at each phase and
-        every few seconds.
+      file: where to. By default, in a notebook, the cell: a bar and, with matplotlib, the mesh as it
+        grows; elsewhere standard error. If it is no terminal, a line at each phase and every few
+        seconds.
     """
+    if file is None and in_notebook():
+        return NotebookBar(title, ProgressBar._numbers)
     return ProgressBar(title, file)
 
 

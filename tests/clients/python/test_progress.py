@@ -2,13 +2,20 @@
 
 import dataclasses
 import io
+import itertools
 import json
+import sys
 import threading
+import types
 
+import IPython.display
 import numpy as np
 import pytest
+import shapes
 import stellate
 from stellate._generated import mesh_pb2
+from stellate._notebook import NotebookBar, calm_output
+from stellate.progress import ProgressBar
 
 
 def progress(**changed):
@@ -213,3 +220,69 @@ def test_a_report_is_the_json_of_all_clients():
     assert json.loads(ours.to_json()) == json.loads(AS_JSON) == ours.to_dict()
     assert len(ours.to_json(indent=2).splitlines()) > 40
     assert stellate.Report.from_wire(message).to_dict()["epsilon"] is None
+
+
+class Cell:
+    """What IPython.display shows, and how often it changed."""
+
+    def __init__(self, monkeypatch):
+        self.outputs = []
+        monkeypatch.setattr(IPython.display, "display", self._display)
+
+    def _display(self, shown, display_id):
+        assert display_id is True
+        states = [shown.data]
+        self.outputs.append(states)
+        return types.SimpleNamespace(update=lambda again: states.append(again.data))
+
+
+def test_a_notebook_has_a_bar_and_the_mesh_in_its_cell(monkeypatch, capsys):
+    cell = Cell(monkeypatch)
+    bar = NotebookBar("a <torus>", ProgressBar._numbers)
+    bar.note("epsilon 0.1 & so on")
+    bar(progress(simplices=0))
+    bar.look(lambda: pytest.fail("there is nothing to see yet"))
+    bar(progress(simplices=24, phase="DONE", fraction=1.0))
+    bar.look(shapes.torus)
+    bar.close()
+    (states,) = cell.outputs  # one, that changed
+    assert "a &lt;torus&gt;" in states[-1] and "epsilon 0.1 &amp; so on" in states[-1]
+    assert 'value="43"' in states[1] and "img" not in states[1]
+    assert 'value="100"' in states[-1] and "done, round 7, 3,456 vertices" in states[-1]
+    assert "data:image/png;base64,iVBOR" in states[-1]
+    bar(progress())
+    assert len(cell.outputs) == 2 and "img" not in cell.outputs[1][0]  # of the next mesh
+    assert capsys.readouterr() == ("", "")
+
+
+def test_pictures_take_a_small_share_of_the_time(monkeypatch):
+    Cell(monkeypatch)
+    clock = itertools.count(0, 3)  # each look at it is 3 s later
+    at_three = types.SimpleNamespace(monotonic=lambda: float(next(clock)))
+    monkeypatch.setattr(stellate._notebook, "time", at_three)
+    bar, looks = NotebookBar("", ProgressBar._numbers), []
+    for _ in range(10):
+        bar(progress(simplices=24))
+        bar.look(lambda: looks.append(1) or shapes.torus())
+    passed = next(clock)
+    assert 2 <= len(looks) <= passed / 30 + 1  # 3 s for one leave 30 s until the next
+
+
+@pytest.mark.parametrize("dimension", [1, 2, 3])
+def test_what_cannot_be_drawn_leaves_the_bar(monkeypatch, dimension):
+    cell = Cell(monkeypatch)
+    bar = NotebookBar("", ProgressBar._numbers)
+    bar(progress(simplices=70_000))
+    bar.look(lambda: pytest.fail("it is too large to draw while others wait"))
+    bar(progress(simplices=1, phase="DONE"))
+    bar.look(lambda: stellate.Mesh(np.zeros((0, 3)), np.zeros((0, dimension + 1), dtype=int)))
+    assert "img" not in cell.outputs[0][-1]
+
+
+def test_who_is_in_no_notebook_gets_lines(monkeypatch):
+    assert isinstance(stellate.progress_bar(), ProgressBar)
+    kind = type("OutStream", (io.StringIO,), {"__module__": "ipykernel.iostream"})
+    monkeypatch.setattr(sys, "stderr", kind())
+    assert isinstance(stellate.progress_bar(), NotebookBar)
+    assert isinstance(stellate.progress_bar(file=Terminal()), ProgressBar)
+    assert calm_output() is sys.stdout
