@@ -6,6 +6,7 @@
 #include <iostream>
 #include <utility>
 
+#include "mesh_settings.h"
 #include "stellate/serve.h"
 
 namespace stellate::cli {
@@ -36,7 +37,11 @@ int DeclareCommand::Run(std::stop_token stop) {
   };
   try {
     const Expected<std::string> name = DeclareMesh(**oracle, options);
-    if (!name) return PrintError(name.error());
+    if (!name) {
+      Error error = name.error();
+      error.message = InFlags(error.message);
+      return PrintError(error);
+    }
     std::cout << *name << "\n";
     return kExitCertified;
   } catch (const std::exception& e) {

@@ -20,8 +20,10 @@ DownloadCommand::DownloadCommand(CLI::App& parent)
       ->add_flag("--unfinished", unfinished_,
                  "take a mesh as it is, even if it has failed or still grows")
       ->excludes(wait);
-  command_->add_option("--revision", options_.revision, "the mesh as of this one; 0: the newest")
-      ->capture_default_str()
+  command_
+      ->add_option("--revision", options_.revision,
+                   "which of those that the mesh has had, counted from 1; default: the newest")
+      ->check(CLI::PositiveNumber)
       ->excludes(wait);
   server_.AddReconnect(command_);
   command_->add_option("--report", report_, "file for the report as JSON");

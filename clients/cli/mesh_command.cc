@@ -8,6 +8,7 @@
 #include <memory>
 #include <utility>
 
+#include "mesh_settings.h"
 #include "progress_bar.h"
 
 namespace stellate::cli {
@@ -66,7 +67,10 @@ int MeshCommand::Run(std::stop_token stop) {
   ClosestPointOnly poor(oracle);
   const Expected<SavedMesh> mesh =
       MeshIt(closest_point_only_ ? static_cast<Oracle&>(poor) : oracle);
-  return mesh ? Deliver(*mesh) : PrintError(mesh.error());
+  if (mesh) return Deliver(*mesh);
+  Error error = mesh.error();
+  error.message = InFlags(error.message);
+  return PrintError(error);
 }
 
 Expected<SavedMesh> MeshCommand::MeshIt(Oracle& oracle) {

@@ -3,6 +3,8 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
+#include <string_view>
 #include <variant>
 
 #include "stellate/client.h"
@@ -18,6 +20,7 @@ using MeshField =
 
 struct MeshSetting {
   const char* flag;  // as CLI11 takes it
+  const char* name;  // in messages of servers and of this client
   MeshField field;
   const char* help;
 };
@@ -26,5 +29,8 @@ struct MeshSetting {
 std::span<const MeshSetting> RunSettings();
 std::span<const MeshSetting> ServingSettings();
 std::span<const MeshSetting> CriteriaSettings();
+
+// A message with the flags in place of the names that they have in the protocol.
+std::string InFlags(std::string_view message);
 
 }  // namespace stellate::cli

@@ -103,6 +103,21 @@ TEST_F(CommandLine, NamesWhatItDoesNotKnow) {
       << file.output;
 }
 
+TEST_F(CommandLine, RefusalsNameTheFlagsThatWereTyped) {
+  const std::pair<const char*, const char*> refused[] = {
+      {"mesh torus -e 0.2 --shape good", "--shape is for k = 3"},
+      {"mesh torus -e 0.2 --advance-step 0.1",
+       "--advance-step is 0.1 but must be at least epsilon"},
+      {"mesh torus -e 0.2 --answer 9 --busy 3", "--busy is 3 but must be --answer (9)"},
+      {"mesh torus -e 0.2 --radius-edge 0.1", "--radius-edge (rho0) is 0.1"},
+      {"mesh torus -e 0.2 --reach -1", "--reach is -1"}};
+  for (const auto& [arguments, words] : refused) {
+    const Result result = OnServer(arguments);
+    EXPECT_EQ(result.status, 2) << arguments;
+    EXPECT_NE(result.output.find(words), std::string::npos) << arguments << ": " << result.output;
+  }
+}
+
 // With a server that is not there: 2, and not 3, says that it was not even looked for.
 TEST_F(CommandLine, FilesAreRefusedBeforeMeshing) {
   for (const std::string arguments :

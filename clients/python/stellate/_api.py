@@ -260,7 +260,7 @@ def download(
     to: Path | Sequence[Path],
     server: str | Server | Client,
     unfinished: Unfinished = "refuse",
-    revision: int = 0,
+    revision: int | None = None,
     on_progress: OnProgress | None = None,
     on_part: OnPart | None = None,
     credentials: Credentials | None = None,
@@ -274,7 +274,7 @@ def download(
     *,
     server: str | Server | Client,
     unfinished: Unfinished = "refuse",
-    revision: int = 0,
+    revision: int | None = None,
     on_progress: OnProgress | None = None,
     on_part: OnPart | None = None,
     credentials: Credentials | None = None,
@@ -288,7 +288,7 @@ def download(
     to: Path | Sequence[Path] = (),
     server: str | Server | Client,
     unfinished: Unfinished = "refuse",
-    revision: int = 0,
+    revision: int | None = None,
     on_progress: OnProgress | None = None,
     on_part: OnPart | None = None,
     credentials: Credentials | None = None,
@@ -308,7 +308,7 @@ def download(
       unfinished: what to do about a mesh that is not over: "refuse" it, "wait" for its end, however
         long that takes, or "take" it as it is now; "take" fetches what there is of a failed or
         cancelled mesh, too.
-      revision: any that the mesh has had, whatever became of the mesh; 0: the newest.
+      revision: any that the mesh has had, counted from 1, whatever became of the mesh; None: the newest.
       on_progress: called in this thread with a stellate.Progress while the mesh is waited for.
       on_part: called at each part that comes, with the vertices and simplices that are here, and
         those of the whole mesh.
@@ -322,14 +322,15 @@ def download(
       MeshNotFound; FailedPrecondition for a mesh that is refused because it is not over; how the
       mesh failed, or Cancelled, with what there is of it in the exception's `mesh`; Unavailable.
     """
+    number = revision or 0  # as the protocol counts
     with _client(server, credentials) as client, told(f"{mesh_name} is left on its server"):
         files = _files(to)
         if files:
             if path is not None:
                 raise TypeError("download() takes either path or to")
-            return fetch_to(client, mesh_name, files, revision, unfinished, on_progress, on_part)
-        mesh = fetch(client, mesh_name, revision, unfinished, on_progress, on_part, path)
-    asked_for_last = revision == 0 and unfinished != "take"
+            return fetch_to(client, mesh_name, files, number, unfinished, on_progress, on_part)
+        mesh = fetch(client, mesh_name, number, unfinished, on_progress, on_part, path)
+    asked_for_last = number == 0 and unfinished != "take"
     if asked_for_last and not isinstance(mesh, FinishedMesh):
         raise protocol_error(f"revision {mesh.revision} is not the last, or has no report")
     if path is not None:

@@ -16,6 +16,7 @@ import contextlib
 import multiprocessing
 import os
 import pathlib
+import re
 import sys
 import traceback
 from collections.abc import Sequence
@@ -232,6 +233,13 @@ def _epsilon(text: str) -> float | str:
         raise argparse.ArgumentTypeError(f"has to be a length or auto, and is '{text}'") from None
 
 
+def _revision(text: str) -> int:
+    number = int(text) if text.isascii() and text.isdigit() else 0
+    if number < 1:
+        raise argparse.ArgumentTypeError(f"has to be a whole number from 1 on, and is '{text}'")
+    return number
+
+
 def _add_settings(command: argparse.ArgumentParser, serves: bool) -> None:
     command.add_argument(
         "-e", "--epsilon", type=_epsilon, required=True,
@@ -322,7 +330,10 @@ def _parser(by_command: bool) -> argparse.ArgumentParser:
     how = one.add_mutually_exclusive_group()
     how.add_argument("--wait", action="store_true", help="for the end of a mesh that is not over")
     how.add_argument("--unfinished", action="store_true", help="as it is, over or failed or not")
-    how.add_argument("--revision", type=int, default=0, metavar="N", help="0: the newest")
+    how.add_argument(
+        "--revision", type=_revision, metavar="N",
+        help="which of those that the mesh has had, counted from 1; default: the newest",
+    )  # fmt: skip
     _add_connection(one, "127.0.0.1:7717")
 
     one = add("doctor", _doctor, "probe an oracle for its contract")
@@ -331,6 +342,19 @@ def _parser(by_command: bool) -> argparse.ArgumentParser:
     one.add_argument("--seed", type=int, default=1, help="of the random queries")
     _add_connection(one, None)
     return parser
+
+
+def _in_flags(message: str) -> str:
+    """A message with the flags in place of the options' names. Words of English name options only where
+    a message begins with them."""
+    flags = {name: flag for flag, name in FLAGS.items()} | {"declared_reach": "--reach"}
+
+    def flag_of(match: re.Match[str]) -> str:
+        group, name = match.groups()
+        named = group or "_" in name or match.start() == 0
+        return flags.get(name, match[0]) if named else match[0]
+
+    return re.sub(r"\b(criteria\.|limits\.)?([a-z_]+)\b", flag_of, message)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -347,7 +371,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"stellate: {error}", file=sys.stderr)
         return _REFUSED
     except StellateError as error:
-        print(f"stellate: {error.reason}: {error}", file=sys.stderr)
+        print(f"stellate: {error.reason}: {_in_flags(str(error))}", file=sys.stderr)
         return exit_status(error)
     except OSError as error:
         print(f"stellate: {error}", file=sys.stderr)
