@@ -194,12 +194,21 @@ test("cut open, a solid shows what is inside, a surface its edge", async () => {
   assert.equal((await picture(page)).share, 0, "nothing is left");
 });
 
-test("a mesh is saved as programs read it: its triangles are turned alike", async () => {
+test("a mesh is saved as programs read it: its triangles are turned outwards", async () => {
   const page = await see({ shape: "torus", epsilon: 0.2, label: "a torus" });
-  const faces = (await saved(page, "obj"))
-    .split("\n")
-    .filter((line) => line.startsWith("f "))
-    .map((line) => line.split(" ").slice(1).map(Number));
+  const lines = (await saved(page, "obj")).split("\n");
+  const of = (letter) =>
+    lines
+      .filter((line) => line.startsWith(`${letter} `))
+      .map((line) => line.split(" ").slice(1).map(Number));
+  const [points, faces] = [of("v"), of("f")];
+  const six = ([a, b, c]) =>
+    a[0] * (b[1] * c[2] - b[2] * c[1]) -
+    a[1] * (b[0] * c[2] - b[2] * c[0]) +
+    a[2] * (b[0] * c[1] - b[1] * c[0]);
+  const volume = faces.reduce((sum, f) => sum + six(f.map((v) => points[v - 1])) / 6, 0);
+  const exact = 2 * Math.PI ** 2 * 0.4 ** 2;
+  assert.ok(Math.abs(volume / exact - 1) < 0.1, `outwards: encloses ${volume} of ${exact}`);
   const { simplices } = await picture(page);
   assert.equal(faces.length, simplices);
   const halves = faces.flatMap((f) => f.map((v, i) => `${v} ${f[(i + 1) % 3]}`));

@@ -157,7 +157,8 @@ class Recorder {
     auto whole = Read<v1::WatchMeshRequest, v1::WatchMeshResponse>(
         request, watch, [this](v1::WatchMeshResponse* response) {
           if (response->has_final()) Anonymize(response->mutable_final());
-          if (response->has_delta() || response->has_final()) Add(*response);
+          if (response->has_delta() || response->has_orientation() || response->has_final())
+            Add(*response);
         });
     End();
     return whole;

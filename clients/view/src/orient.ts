@@ -1,11 +1,16 @@
 // Simplices as programs that read meshes want them: turned alike.
 import type { MeshStore } from "./store";
 
-// All ids, k + 1 of each simplex. Triangles that share an edge are turned the same way round, where the
-// surface has two sides; tetrahedra of space are positive.
+// All ids, k + 1 of each simplex, as the server turned them: of a closed surface outwards. While a mesh
+// grows, triangles that share an edge are turned the same way round, where the surface has two sides, and
+// tetrahedra of space are positive.
 export function oriented(store: MeshStore): Uint32Array {
   const { k, d, simplices } = store;
   const cells = store.cells.slice(0, simplices * (k + 1));
+  if (store.turned !== null) {
+    turnAsTold(store.turned, cells, k + 1);
+    return cells;
+  }
   if (k === 3 && d === 3) turnPositive(store, cells);
   if (k === 2) turnAlike(cells);
   return cells;
@@ -13,6 +18,19 @@ export function oriented(store: MeshStore): Uint32Array {
 
 function turn(cells: Uint32Array, at: number) {
   [cells[at], cells[at + 1]] = [cells[at + 1], cells[at]];
+}
+
+// The bits are those of the rows in lexicographic order.
+function turnAsTold(bits: Uint8Array, cells: Uint32Array, width: number) {
+  const order = Uint32Array.from({ length: cells.length / width }, (_, i) => i);
+  order.sort((a, b) => {
+    let i = 0;
+    while (i < width - 1 && cells[a * width + i] === cells[b * width + i]) i++;
+    return cells[a * width + i] - cells[b * width + i];
+  });
+  order.forEach((cell, i) => {
+    if ((bits[i >> 3] >> (i & 7)) & 1) turn(cells, cell * width + width - 2);
+  });
 }
 
 function turnPositive({ points }: MeshStore, cells: Uint32Array) {

@@ -21,6 +21,9 @@ export class MeshStore {
   labelCount = 0;
   labels = new Uint8Array();
   places: Uint8Array | null = null; // of each vertex, of a reconstruction that is over
+  // Of a mesh that is over: which of its simplices, in lexicographic order, are turned, as bits; none
+  // where it has no two sides. null: not known.
+  turned: Uint8Array | null = null;
 
   // Open addressing: which simplex is where in `cells`. -1: free.
   private table = new Int32Array(1024).fill(-1);
@@ -34,7 +37,7 @@ export class MeshStore {
     this.vertices = this.simplices = this.revision = 0;
     this.walls.clear();
     this.labelCount = 0;
-    this.places = null;
+    this.places = this.turned = null;
     this.table = new Int32Array(1024).fill(-1);
   }
 
@@ -43,6 +46,15 @@ export class MeshStore {
     this.points = grown(this.points, end * this.d);
     this.points.set(points, first * this.d);
     this.vertices = Math.max(this.vertices, end);
+  }
+
+  // A part of it, from a simplex on that is a multiple of 8.
+  addTurned(first: number, bits: Uint8Array) {
+    if (first + 8 * bits.length >= this.simplices + 8) return; // of another mesh
+    const whole = new Uint8Array(first / 8 + bits.length);
+    if (this.turned) whole.set(this.turned.subarray(0, first / 8));
+    whole.set(bits, first / 8);
+    this.turned = whole;
   }
 
   addWalls(vertices: number[], walls: bigint[]) {
@@ -64,6 +76,7 @@ export class MeshStore {
   addCells(cells: Uint32Array, labels: Uint8Array = new Uint8Array()) {
     const width = this.k + 1;
     const count = cells.length / width;
+    if (count > 0) this.turned = null;
     if (count > 0 && labels.length > 0) this.labelCount = labels.length / count;
     this.labels = grown(this.labels, (this.simplices + count) * this.labelCount);
     this.cells = grown(this.cells, (this.simplices + count) * width);
@@ -80,6 +93,7 @@ export class MeshStore {
 
   removeCells(cells: Uint32Array) {
     const width = this.k + 1;
+    if (cells.length > 0) this.turned = null;
     for (let i = 0; i < cells.length; i += width) {
       const slot = this.find(cells, i);
       const hole = this.table[slot];

@@ -142,6 +142,8 @@ export class Viewing {
       } else if (event.case === "resetMesh") {
         this.store?.clear();
         this.draw();
+      } else if (event.case === "orientation") {
+        this.store?.addTurned(Number(event.value.firstSimplex), event.value.turned);
       } else if (event.case === "final") {
         this.over = true;
         this.hear(event.value);
