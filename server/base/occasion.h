@@ -9,7 +9,7 @@ namespace stellate::server {
 
 // Something that happens once, and the calls that wait for it. Any thread.
 //
-//   occasion.Then([call] { call->Answer(); });   // at once, if it has happened
+//   occasion.Then([call] { call->Answer(); });  // immediately, if it has happened
 //   occasion.Happen();                           // calls all that wait, once each
 class Occasion {
  public:
