@@ -21,7 +21,17 @@ template <int K>
 double ClearanceOf(const double* y, const Stars<K>& stars) {
   std::pair<double, std::uint32_t> nearest;
   if (stars.sample().Nearest(y, 1, &nearest) == 0) return INFINITY;
-  return std::sqrt(nearest.first / stars.cell(nearest.second).max_norm2());
+  double norm2 = 0;
+  for (int sector = 0; sector < stars.sample().sectors().Count(nearest.second); ++sector)
+    norm2 = std::max(norm2, stars.cell(nearest.second, sector).max_norm2());
+  return std::sqrt(nearest.first / norm2);
+}
+
+// Whether a point inside of M may be inserted at y. Most answers that were not used were for a
+// face, and lie on it: there a point that is on no wall would be in a star of either side.
+template <int K>
+bool IsClearOfFaces(const double* y, const Stars<K>& stars) {
+  return !stars.sample().InProtectingBall(y) && !stars.EncroachedBy(y, 0);
 }
 
 }  // namespace
@@ -76,12 +86,12 @@ std::vector<double> SparePoints::Uncovered(const Stars<K>& stars) const {
 template <int K>
 Eigen::MatrixXd SparePoints::Choose(const std::vector<double>& points, const Stars<K>& stars,
                                     double epsilon) {
-  if (points.empty() || chosen_ == kMostChosen) return {};
-  ++chosen_;
+  if (chosen_ == kMostChosen) return {};
   std::vector<const double*> chosen;
   for (std::size_t at = 0; at < points.size(); at += d_) {
     CheckInterruption(at);
     const double* y = points.data() + at;
+    if (!IsClearOfFaces(y, stars)) continue;
     std::pair<double, std::uint32_t> nearest;
     stars.sample().Nearest(y, 1, &nearest);
     const double apart = std::min(epsilon, std::sqrt(nearest.first) / 2);
@@ -90,6 +100,7 @@ Eigen::MatrixXd SparePoints::Choose(const std::vector<double>& points, const Sta
         }))
       chosen.push_back(y);
   }
+  chosen_ += !chosen.empty();
   Eigen::MatrixXd all(stars.sample().d(), static_cast<Eigen::Index>(chosen.size()));
   for (std::size_t i = 0; i < chosen.size(); ++i)
     std::copy_n(chosen[i], d_, all.col(static_cast<Eigen::Index>(i)).data());

@@ -26,9 +26,9 @@ class SparePoints {
   template <int K>
   std::vector<double> Uncovered(const Stars<K>& stars) const;
 
-  // Returns one representative of each cluster of `points` (d each), d x n, to be queried with
-  // tangents and sizes. Empty if there are none, or if this was done so often that it does not
-  // help.
+  // Returns one representative of each cluster of `points` (d each) that encroach on no face, d x
+  // n, to be queried with tangents and sizes. Empty if there are none, or if this was done so often
+  // that it does not help.
   template <int K>
   Eigen::MatrixXd Choose(const std::vector<double>& points, const Stars<K>& stars, double epsilon);
 

@@ -179,3 +179,19 @@ def test_a_refusal_and_a_report_name_places_in_plain_coordinates(server):
         np.abs([stripe(np.array([sharpest.point])), oblique(np.array([sharpest.point]))]).max()
         < 1e-9
     )
+
+
+def test_a_gyroid_is_cut_at_a_corner_without_symmetry(server):
+    """Walls that meet at 38 degrees, so that some answers on a face are used by no star: they are no
+    points of the inside, though the mesh is far from them."""
+    cell = oracles.PeriodicCell(2 * np.pi * np.eye(3))
+
+    def gyroid(x):
+        return sum(np.sin(x[:, i]) * np.cos(x[:, (i + 1) % 3]) for i in range(3))
+
+    cut = cell.cut(gyroid, labels=[1, 2], origin=[0.3, 0.4, 0.5])
+    mesh = stellate.mesh(cut, 0.45, server=server)
+    assert mesh.certified, mesh.report.certificate.verdict
+    plain = mesh.unwrap(cut).plain()
+    volumes = [plain.region(label).volume for label in (1, 2)]
+    assert np.allclose(volumes, 4 * np.pi**3, rtol=1e-3)
