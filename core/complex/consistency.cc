@@ -249,16 +249,22 @@ std::uint64_t CountInconsistent(const Stars<K>& stars, std::uint32_t p) {
   return count;
 }
 
+namespace {
+
+// FindInconsistentConfiguration in one of the star's sectors.
 template <int K>
-std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(const Stars<K>& stars,
-                                                                          std::uint32_t p) {
+std::optional<InconsistentConfiguration<K>> FindInconsistentIn(const Stars<K>& stars,
+                                                               std::uint32_t p, int sector) {
   InconsistentConfiguration<K> found;
   found.holder = p;
-  for (std::size_t v = 0; v < stars.cell(p).vertex_count(); ++v) {
-    if (!stars.SimplexOf(p, stars.cell(p), v, &found.simplex)) continue;
-    const std::uint64_t key = SimplexKey<K>(stars.cell(p), v, p);
+  const auto& cell = stars.cell(p, sector);
+  const std::uint64_t piece = stars.sample().sectors().Piece(p, sector, 0);
+  if (piece == 0) return std::nullopt;
+  for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+    if (!stars.SimplexOf(p, cell, v, &found.simplex)) continue;
+    const std::uint64_t key = SimplexKey<K>(cell, v, p);
     for (const std::uint32_t q : found.simplex) {
-      if (q == p || FindSimplex<K>(stars.cell(q), q, found.simplex, key)) continue;
+      if (q == p || HasSimplex<K>(stars, q, key, piece)) continue;
       found.refuser = q;
       const Eigen::VectorXd from = CentreIn<K>(stars, p, found.simplex);
       const Eigen::VectorXd to = CentreIn<K>(stars, q, found.simplex);
@@ -283,6 +289,16 @@ std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(const 
       return found;
     }
   }
+  return std::nullopt;
+}
+
+}  // namespace
+
+template <int K>
+std::optional<InconsistentConfiguration<K>> FindInconsistentConfiguration(const Stars<K>& stars,
+                                                                          std::uint32_t p) {
+  for (int sector = 0; sector < stars.sample().sectors().Count(p); ++sector)
+    if (auto found = FindInconsistentIn<K>(stars, p, sector)) return found;
   return std::nullopt;
 }
 

@@ -173,6 +173,7 @@ void ExplainWallCurvature(const Engine<K>& engine, double epsilon,
                  " degrees between vertices that are ", Brief(bend->length), " apart, near ",
                  NamePoint(bend->point), ": if it is round, take epsilon at most ",
                  Brief(bend->size_to_take()),
+                 engine.criteria().graded() ? "" : ", or be as fine there alone, by a size_rate",
                  "; if it has a crease there, give its sides as walls of their own, which meet in "
                  "an edge"),
          &certificate->verdict);
@@ -338,18 +339,24 @@ std::string WhatIsLeft(const Engine<K>& engine, std::uint64_t inconsistent) {
                     entries.front().star, " near ", place(entries.front().star), "; ");
   if (!entries.empty() && inconsistent == 0) return left + "try a smaller epsilon";
   left += Message(inconsistent, " simplices are inconsistent");
+  std::optional<std::uint32_t> on_face;
   for (std::uint32_t p = 0; p < stars.size(); ++p) {
     CheckInterruption(p);
     // As rules count them: the simplices of an open star are not judged.
     if (!stars.cell(p).bounded()) continue;
     const auto found = FindInconsistentConfiguration<K>(stars, p);
+    if (!found && !on_face && CountInconsistent<K>(stars, p) > 0) on_face = p;
     if (!found) continue;
+    on_face.reset();
     left += Message(", the first in the star of vertex ", found->holder, " but not in that of ",
                     found->refuser);
     if (found->nearer) left += Message(", where vertex ", *found->nearer, " is nearer");
     left += Message(", near ", place(found->holder));
     break;
   }
+  if (on_face)
+    left += Message(", the first on a face of the star of vertex ", *on_face, " near ",
+                    place(*on_face));
   return left + "; try a smaller epsilon";
 }
 

@@ -40,7 +40,8 @@ TEST(BentWallsTest, ASmallHoleIsNamedWithTheSizeToTake) {
   for (const unsigned turn : {0u, 1u, 2u}) {
     const Certificate c = CertificateOf(PiercedDisc(0.15).Turned(turn), 0.3);
     ExpectWords(c, "ertified: wall 1 bends by ");
-    ExpectWords(c, "if it is round, take epsilon at most 0.06;");
+    ExpectWords(
+        c, "if it is round, take epsilon at most 0.06, or be as fine there alone, by a size_rate;");
   }
   EXPECT_TRUE(CertificateOf(PiercedDisc(0.15), 0.06).certified) << "as it says";
 }
