@@ -248,9 +248,14 @@ impl Client {
 
     /// What the server is and allows.
     pub fn info(&self) -> Result<ServerInfo, Error> {
-        self.runtime.block_on(self.call(&mut self.outage(), false, |mut stub| async move {
+        self.runtime.block_on(self.info_async())
+    }
+
+    pub(crate) async fn info_async(&self) -> Result<ServerInfo, Error> {
+        self.call(&mut self.outage(), false, |mut stub| async move {
             stub.get_server_info(GetServerInfoRequest::default()).await
-        }))
+        })
+        .await
     }
 
     /// Serves a mesh with this oracle until it is over; the state that it ended in, e.g. "SUCCEEDED".

@@ -1,7 +1,7 @@
 //! The client's copy of a mesh that grows by deltas.
 
 use crate::error::Error;
-use crate::proto::{DeltaChunk, MeshDelta, Orientation};
+use crate::proto::{DeltaChunk, MeshDelta, Orientation, Place, Places};
 use crate::rows::{bits_of, bytes_of_bits, is_set, row_at, sorted_order};
 use crate::wire::{indices, numbers};
 use crate::Mesh;
@@ -24,6 +24,8 @@ pub struct GrowingComplex {
     turned: Option<Vec<u8>>, // of the last revision; None: not told
     turned_rows: Vec<u32>,   // of a download
     untold: bool,            // a part of the download was not oriented
+    places: Vec<String>,     // of a download of a reconstruction
+    smoothed: Vec<f64>,
 }
 
 impl GrowingComplex {
@@ -43,6 +45,8 @@ impl GrowingComplex {
             turned: None,
             turned_rows: Vec::new(),
             untold: false,
+            places: Vec::new(),
+            smoothed: Vec::new(),
         }
     }
 
@@ -130,7 +134,29 @@ impl GrowingComplex {
         if !self.untold {
             self.turned = Some(bits_of(&self.rows, &self.turned_rows, self.k + 1));
         }
-        self.finished()
+        let mesh = self.finished()?;
+        let count = mesh.points.len();
+        let (places, smoothed) = (std::mem::take(&mut self.places), std::mem::take(&mut self.smoothed));
+        Ok(Mesh {
+            places: if places.len() * self.d == count { places } else { Vec::new() },
+            smoothed: Some(smoothed).filter(|all| count > 0 && all.len() == count),
+            ..mesh
+        })
+    }
+
+    /// Notes what became of the points of a part of a download.
+    pub(crate) fn add_places(&mut self, part: Option<Places>) -> Result<(), Error> {
+        let Some(part) = part else { return Ok(()) };
+        let names = part.codes.iter().map(|&code| match Place::try_from(i32::from(code)) {
+            Ok(place) => place.as_str_name().trim_start_matches("PLACE_").to_string(),
+            Err(_) => code.to_string(), // of a newer server
+        });
+        self.places.extend(names);
+        if part.smoothed.is_some() {
+            let shape = [part.codes.len() as i64, self.d as i64];
+            self.smoothed.extend(numbers(part.smoothed.as_ref(), &shape).map_err(Error::protocol)?);
+        }
+        Ok(())
     }
 
     /// Drops the chunks of a revision that was cut short: it will be sent again.
@@ -217,6 +243,8 @@ impl GrowingComplex {
             simplices: self.rows.clone(),
             walls,
             turned: None,
+            places: Vec::new(),
+            smoothed: None,
             revision: self.revision,
             progress: None,
             report: None,

@@ -24,6 +24,10 @@ pub struct Mesh {
     pub walls: Vec<u64>,
     /// The protocol's `Orientation.turned`: see [`Mesh::oriented_simplices`].
     pub turned: Option<Vec<u8>>,
+    /// What became of each point of a reconstruction, "OK" or another `Place`; empty of other meshes.
+    pub places: Vec<String>,
+    /// `[n, d]`, the positions that a reconstruction of noisy points was built on.
+    pub smoothed: Option<Vec<f64>>,
     /// One for each round that changed the mesh.
     pub revision: u64,
     /// How it stood at this revision.
@@ -56,6 +60,8 @@ impl Mesh {
             simplices: rows,
             walls: Vec::new(),
             turned: None,
+            places: Vec::new(),
+            smoothed: None,
             revision: 0,
             progress: None,
             report: None,
