@@ -48,8 +48,9 @@ const char* PlaceAdvice(Place place) {
       return "another part of the manifold is as near as the neighbours are: add points there";
     case Place::kNoise:
       return "points are off a smooth manifold by half of the spacing or more: if by noise, "
-             "average "
-             "or thin them; a crease or a corner stays in doubt, however many points there are";
+             "average or thin them; if they are outliers, take them out; a crease or a corner "
+             "stays "
+             "in doubt, however many points there are";
     case Place::kSparse:
       return "tangent spaces turn too far from point to point: about 2.3 times as many points are "
              "needed here";

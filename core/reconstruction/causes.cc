@@ -7,6 +7,7 @@
 #include "core/base/dense.h"
 #include "core/base/parallel.h"
 #include "core/base/vector_ops.h"
+#include "core/index/indexed_points.h"
 
 namespace stellate::core {
 namespace {
@@ -25,6 +26,12 @@ constexpr double kSteep = 0.5;
 // And farther above it, in standard deviations, than noise often moves a point.
 constexpr double kSheetDeviations = 2.5;
 constexpr double kParallel2 = 0.25;
+// An outlier is this high over the tangent spaces at its neighbours, in local spacings; and in
+// heights of its neighbours over those around them, which are as high where M itself bends.
+constexpr double kOutlying = 0.5;
+constexpr double kOutlyingAlone = 3;
+// How far an outlier's star may reach, in local spacings: one that reaches farther is open.
+constexpr double kOutlyingReach = 8;
 // sin^2 of 60 degrees.
 constexpr double kTurned2 = 0.75;
 // Residuals on two sheets, midway between normal ones, 3, cut short by the fit, and two values, 1.
@@ -84,6 +91,48 @@ bool IsNoisy(const FittedCloud& cloud, std::uint32_t p) {
          cloud.height[p] > std::max(kOutlier * h, kOutlierDeviations * cloud.noise[p]);
 }
 
+// How high p is over the tangent spaces at its neighbours: the median, length. Unlike that over the
+// quadric around p it is not drawn towards p.
+double HeightOverNeighbours(const FittedCloud& cloud, std::uint32_t p) {
+  std::vector<double> heights, step(static_cast<std::size_t>(cloud.d));
+  for (const std::uint32_t q : cloud.Near(p).subspan(1)) {
+    const double *a = cloud.Position(q), *b = cloud.Position(p);
+    for (int i = 0; i < cloud.d; ++i) step[static_cast<std::size_t>(i)] = b[i] - a[i];
+    double above2 = Dot(step.data(), step.data(), cloud.d);
+    for (int e = 0; e < cloud.k; ++e) {
+      const double along = Dot(cloud.Tangent(q) + e * cloud.d, step.data(), cloud.d);
+      above2 -= along * along;
+    }
+    heights.push_back(std::sqrt(std::max(0.0, above2)));
+  }
+  return Median(std::move(heights));
+}
+
+// Marks outliers and the points that their stars may reach: where these are not resolved, it is
+// because of the outlier. The star of one at height D has the points that are D away from below it.
+std::vector<std::uint8_t> FindBesideOutliers(const FittedCloud& cloud) {
+  std::vector<double> heights(cloud.size);
+  ParallelFor(cloud.size, [&](std::uint32_t p) { heights[p] = HeightOverNeighbours(cloud, p); });
+  IndexedPoints points(cloud.d);
+  for (std::uint32_t p = 0; p < cloud.size; ++p) points.AddUnindexed(cloud.Position(p));
+  points.Index();
+  std::vector<std::uint8_t> beside(cloud.size);
+  ParallelFor(cloud.size, [&](std::uint32_t p) {
+    const double h = cloud.spacing[p];
+    if (!(heights[p] > kOutlying * h)) return;
+    std::vector<double> around;
+    for (const std::uint32_t q : cloud.Near(p).subspan(1)) around.push_back(heights[q]);
+    if (!(heights[p] > kOutlyingAlone * Median(std::move(around)))) return;
+    const double radius = std::min(2 * (heights[p] + h), kOutlyingReach * h);
+    points.tree().VisitNear(
+        cloud.Position(p), [&] { return radius; },
+        [&](std::uint32_t q, double) {
+          std::atomic_ref(beside[q]).store(1, std::memory_order_relaxed);
+        });
+  });
+  return beside;
+}
+
 // Marks the vertices of edges along which tangent spaces turn too far.
 std::vector<std::uint8_t> FindTurning(const FittedCloud& cloud, const Assembly& assembly) {
   std::vector<std::uint8_t> turning(cloud.size);
@@ -112,6 +161,10 @@ std::vector<std::uint8_t> FindTurning(const FittedCloud& cloud, const Assembly& 
 
 Causes FindCauses(const FittedCloud& cloud, const Assembly& assembly, bool edges_allowed) {
   const std::vector<std::uint8_t> turning = FindTurning(cloud, assembly);
+  const auto& places = assembly.places;
+  std::vector<std::uint8_t> beside_outlier(cloud.size);
+  if (std::find(places.begin(), places.end(), Place::kDisagree) != places.end())
+    beside_outlier = FindBesideOutliers(cloud);
   Causes causes;
   causes.places.assign(cloud.size, Place::kOk);
   ParallelFor(cloud.size, [&](std::uint32_t p) {
@@ -122,7 +175,7 @@ Causes FindCauses(const FittedCloud& cloud, const Assembly& assembly, bool edges
       cause = Place::kEdge;
     else if (HasSheetNear(cloud, p))
       cause = Place::kSheets;
-    else if (IsNoisy(cloud, p))
+    else if (IsNoisy(cloud, p) || (!resolved && beside_outlier[p] != 0))
       cause = Place::kNoise;
     else if (turning[p])
       cause = Place::kSparse;

@@ -3,6 +3,7 @@
 //
 //   reconstruction_campaign [--seeds N] [--first SEED] [--only NAME] [--verbose]
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
@@ -129,10 +130,14 @@ struct Tally {
   double seconds = 0;
 };
 
+// Whether what most of the unresolved points say is one of the causes.
 bool Names(const std::vector<Place>& causes, const stellate::core::ReconstructionCounts& counts) {
-  for (const Place cause : causes)
-    if (counts.places[static_cast<std::size_t>(cause)] > 0) return true;
-  return false;
+  const auto count = [&](Place place) { return counts.places[static_cast<std::size_t>(place)]; };
+  std::uint64_t most = 0, named = 0;
+  for (int place = static_cast<int>(Place::kEdge); place < stellate::core::kPlaces; ++place)
+    most = std::max(most, count(static_cast<Place>(place)));
+  for (const Place cause : causes) named = std::max(named, count(cause));
+  return named > 0 && named == most;
 }
 
 void Run(const Kind& kind, std::uint64_t seed, bool verbose, Tally* tally) {

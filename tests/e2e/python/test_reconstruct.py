@@ -90,6 +90,7 @@ def test_equal_points_are_merged(server, torus):
     assert mesh.certified, mesh.report
     assert (mesh.places[-3:] == "MERGED").all()
     assert mesh.simplices.max() < len(torus)
+    assert mesh.betti() == (1, 2, 1)  # a merged point is no component
 
 
 @pytest.mark.parametrize(
