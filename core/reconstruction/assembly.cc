@@ -42,9 +42,11 @@ class Assembler {
   Assembler(const FittedCloud& cloud, std::uint64_t most_dropped)
       : cloud_(cloud), most_dropped_(most_dropped), spacing_(Median(cloud.spacing)) {}
 
-  Assembly Run(FunctionRef<void(double)> done) {
+  Assembly Run(bool exudes, FunctionRef<void(double)> done) {
     std::vector<std::uint32_t> all(cloud_.size);
     std::iota(all.begin(), all.end(), 0u);
+    if constexpr (K == 3)
+      if (exudes && Exude(all, done)) return std::move(result_);
     Begin(BuildAll(all, K >= 3 ? CentreRule::kCommonCentre : CentreRule::kTangentSpace));
     done(0.5);
     if (K >= 3 && IsWorthMore()) Begin(BuildAll(all, CentreRule::kTangentSpace));
@@ -61,6 +63,22 @@ class Assembler {
  private:
   TiledStars BuildAll(std::vector<std::uint32_t> ids, CentreRule rule) {
     return BuildTiledStars<K>(cloud_, {std::move(ids), rule, nullptr, spacing_});
+  }
+
+  // Takes the stars of weighted points if all agree. Returns whether they do.
+  bool Exude(const std::vector<std::uint32_t>& all, FunctionRef<void(double)> done) {
+    std::vector<double> weights =
+        FindExudingWeights<K>(cloud_, [&](double share) { done(0.5 * share); });
+    if (weights.empty()) return false;
+    TiledStars stars =
+        BuildTiledStars<K>(cloud_, {all, CentreRule::kTangentSpace, &weights, spacing_});
+    if (!stars.unfilled.empty()) return false;
+    Begin(std::move(stars));
+    for (std::uint32_t p = 0; p < cloud_.size; ++p)
+      if (weights[p] > 0) result_.places[p] = Place::kWeighted;
+    result_.weights = std::move(weights);
+    done(1);
+    return true;
   }
 
   void Begin(TiledStars stars) {
@@ -330,13 +348,13 @@ std::vector<std::uint32_t> Assembler<K>::Replace(std::vector<std::uint32_t> chan
 }  // namespace
 
 template <int K>
-Assembly Assemble(const FittedCloud& cloud, std::uint64_t most_dropped,
+Assembly Assemble(const FittedCloud& cloud, std::uint64_t most_dropped, bool exudes,
                   FunctionRef<void(double)> done) {
-  return Assembler<K>(cloud, most_dropped).Run(done);
+  return Assembler<K>(cloud, most_dropped).Run(exudes, done);
 }
 
-template Assembly Assemble<1>(const FittedCloud&, std::uint64_t, FunctionRef<void(double)>);
-template Assembly Assemble<2>(const FittedCloud&, std::uint64_t, FunctionRef<void(double)>);
-template Assembly Assemble<3>(const FittedCloud&, std::uint64_t, FunctionRef<void(double)>);
+template Assembly Assemble<1>(const FittedCloud&, std::uint64_t, bool, FunctionRef<void(double)>);
+template Assembly Assemble<2>(const FittedCloud&, std::uint64_t, bool, FunctionRef<void(double)>);
+template Assembly Assemble<3>(const FittedCloud&, std::uint64_t, bool, FunctionRef<void(double)>);
 
 }  // namespace stellate::core

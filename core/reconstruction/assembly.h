@@ -22,9 +22,11 @@ struct Assembly {
 // Assembles the mesh: stars, in tangent spaces for k <= 2 and at common centres else; tilings of
 // the cavities where they disagree; where that does not fill all, stars in tangent spaces; weights
 // at the cavities that are left; and fewer points there, up to `most_dropped`. Weights and drops
-// change only what is near. `done`: is called with the share of the work done.
+// change only what is near. `exudes`, for k = 3: weights of all points come first, by which stars
+// in tangent spaces agree and have few slivers; what they do not settle is assembled as ever.
+// `done`: is called with the share of the work done.
 template <int K>
-Assembly Assemble(const FittedCloud& cloud, std::uint64_t most_dropped,
+Assembly Assemble(const FittedCloud& cloud, std::uint64_t most_dropped, bool exudes,
                   FunctionRef<void(double)> done);
 
 }  // namespace stellate::core

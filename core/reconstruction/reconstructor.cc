@@ -25,6 +25,8 @@ namespace {
 
 // The share of the time that each phase ends at.
 constexpr double kIndexedBy = 0.03, kFittedBy = 0.4, kAssembledBy = 0.85;
+// Points for which weights are tried that may make a mesh provable: a minute or two.
+constexpr std::size_t kMostExuded = 100'000;
 
 // The distinct points: of equal ones the first.
 struct Distinct {
@@ -121,20 +123,23 @@ class Reconstructor {
 
   void Assemble() {
     const auto dropped = static_cast<std::uint64_t>(spec_.drop * static_cast<double>(n_));
+    // Tetrahedra that tilt are what a proof fails by; surfaces have none, and are proved as they
+    // are.
+    const bool exudes = spec_.reach && spec_.noise == 0.0 && n_ <= kMostExuded;
     const auto done = [&](double share) {
       watch_.Advance(share < 1 ? ReconstructionPhase::kFilling : ReconstructionPhase::kCertifying,
                      kFittedBy + share * (kAssembledBy - kFittedBy));
     };
     switch (spec_.dimension) {
       case 1:
-        assembly_ = core::Assemble<1>(cloud_, dropped, done);
+        assembly_ = core::Assemble<1>(cloud_, dropped, exudes, done);
         return;
       case 2:
-        assembly_ = core::Assemble<2>(cloud_, dropped, done);
+        assembly_ = core::Assemble<2>(cloud_, dropped, exudes, done);
         return;
       default:
         static_assert(kMaxReconstructionDimension == 3);
-        assembly_ = core::Assemble<3>(cloud_, dropped, done);
+        assembly_ = core::Assemble<3>(cloud_, dropped, exudes, done);
     }
   }
 

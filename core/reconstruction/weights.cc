@@ -1,13 +1,17 @@
 #include "core/reconstruction/weights.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
+#include <numeric>
 #include <set>
 #include <unordered_map>
 #include <utility>
 
+#include "core/base/dense.h"
 #include "core/base/infinity.h"
 #include "core/base/interruption.h"
 #include "core/base/random.h"
@@ -29,6 +33,11 @@ constexpr double kBeyond = 0.01;
 constexpr double kReachError = 1 + 1e-7;
 // Intervals shorter than this share of all weights are no choice.
 constexpr double kShort = 1e-9;
+// cos^2 of 65 degrees: what tilts by more against the tangent space at a vertex is a sliver.
+constexpr double kUpright2 = 0.1786;
+// Sweeps over all points: most ever, and without fewer simplices to fix.
+constexpr int kSweepsOfAll = 40;
+constexpr int kVainSweeps = 6;
 
 // The half-spaces of a cell, by number.
 template <int D>
@@ -120,6 +129,34 @@ class WeightSearch {
     }
     return changed_;
   }
+
+  // Weighs the points where stars disagree, and then those where they disagree or have slivers.
+  // Returns whether all agree. done(share) is called now and then.
+  bool RunOnAll(FunctionRef<void(double)> done) {
+    for (const bool exudes : {false, true}) {
+      exudes_ = exudes;
+      std::size_t fewest = std::numeric_limits<std::size_t>::max();
+      int vain = 0;
+      for (int sweep = 0; sweep < kSweepsOfAll; ++sweep) {
+        std::set<std::uint32_t> at;
+        const std::size_t bad = FindBad(&at);
+        if (bad == 0 || vain == kVainSweeps) break;
+        vain = bad < fewest ? 0 : vain + 1;
+        fewest = std::min(fewest, bad);
+        if (vain > 0)
+          for (const std::uint32_t p : std::vector(at.begin(), at.end()))
+            for (const Simplex& s : StarOf(p).simplices) at.insert(s.begin(), s.end());
+        for (const std::uint32_t p : at) {
+          ThrowIfInterrupted();
+          Improve(p, sweep);
+        }
+        done((exudes ? 0.5 : 0) + 0.5 * sweep / kSweepsOfAll);
+      }
+    }
+    exudes_ = false;
+    std::set<std::uint32_t> at;
+    return FindBad(&at) == 0;
+  }
   double weight(std::uint32_t p) const { return weights_[p]; }
 
  private:
@@ -193,6 +230,49 @@ class WeightSearch {
       for (const std::uint32_t q : star.simplices[i])
         if (!Holds(q, star.keys[i])) return false;
     return true;
+  }
+
+  // Whether the simplex tilts by more than 65 degrees against the tangent space at one of its
+  // vertices.
+  bool IsSliver(const Simplex& s, std::uint64_t key) {
+    const auto [known, fresh] = slivers_.try_emplace(key, false);
+    if (fresh) known->second = MeasureSliver(s);
+    return known->second;
+  }
+  bool MeasureSliver(const Simplex& s) const {
+    Eigen::MatrixXd edges(cloud_.d, K);
+    for (int j = 0; j < K; ++j)
+      for (int i = 0; i < cloud_.d; ++i)
+        edges(i, j) = points_.Point(s[static_cast<std::size_t>(j) + 1])[i] - points_.Point(s[0])[i];
+    const Eigen::Matrix<double, K, K> gram = edges.transpose() * edges;
+    const Eigen::LLT<Eigen::Matrix<double, K, K>> root(gram);
+    if (root.info() != Eigen::Success) return true;
+    for (const std::uint32_t v : s) {
+      const Eigen::Map<const Eigen::MatrixXd> tangent(cloud_.Tangent(ids_[v]), cloud_.d, K);
+      Eigen::Matrix<double, K, K> cosines = edges.transpose() * tangent;
+      root.matrixL().solveInPlace(cosines);
+      if (!(EigenvaluesOfSymmetric(cosines * cosines.transpose())[0] > kUpright2)) return true;
+    }
+    return false;
+  }
+
+  // Adds the vertices of all simplices about which stars disagree and, where it exudes, of slivers.
+  // Returns the number of (simplex, star) pairs.
+  std::size_t FindBad(std::set<std::uint32_t>* at) {
+    std::size_t bad = 0;
+    for (std::uint32_t p = 0; p < ids_.size(); ++p) {
+      ThrowIfInterrupted();
+      const Star star = StarOf(p);
+      for (std::size_t i = 0; i < star.keys.size(); ++i) {
+        const Simplex& s = star.simplices[i];
+        const bool held = std::all_of(s.begin(), s.end(),
+                                      [&](std::uint32_t q) { return Holds(q, star.keys[i]); });
+        if (held && !(exudes_ && IsSliver(s, star.keys[i]))) continue;
+        ++bad;
+        at->insert(s.begin(), s.end());
+      }
+    }
+    return bad;
   }
 
   // Cuts a cell by the points near p, as far as they can cut. cut(q, distance2) does it.
@@ -292,8 +372,8 @@ class WeightSearch {
     return meets;
   }
 
-  // Returns between which values of y how many simplices are in some but not all of their vertices'
-  // stars. `around`: the stars that depend on y.
+  // Returns between which values of y how much is bad: a simplex in some but not all of its
+  // vertices' stars counts 2, a sliver 1 where it exudes. `around`: the stars that depend on y.
   std::vector<Segment> CountBad(const std::vector<std::uint32_t>& around,
                                 const std::vector<Span>& spans, double lower, double upper) {
     struct Event {
@@ -302,12 +382,13 @@ class WeightSearch {
       int change;
     };
     std::unordered_map<std::uint64_t, std::size_t> numbers;
-    std::vector<int> holders;
+    std::vector<int> holders, if_held;
     std::vector<Event> events;
     for (const Span& span : spans) {
       const auto [at, fresh] = numbers.emplace(span.key, holders.size());
       if (fresh) {
         holders.push_back(0);
+        if_held.push_back(exudes_ && IsSliver(span.simplex, span.key) ? 1 : 0);
         for (const std::uint32_t v : span.simplex)
           if (std::find(around.begin(), around.end(), v) == around.end())
             holders.back() += Holds(v, span.key);
@@ -317,9 +398,11 @@ class WeightSearch {
     }
     std::stable_sort(events.begin(), events.end(),
                      [](const Event& a, const Event& b) { return a.y < b.y; });
-    const auto is_bad = [&](std::size_t s) { return holders[s] > 0 && holders[s] < K + 1; };
+    const auto badness = [&](std::size_t s) {
+      return holders[s] == 0 ? 0 : holders[s] < K + 1 ? 2 : if_held[s];
+    };
     int bad = 0;
-    for (std::size_t s = 0; s < holders.size(); ++s) bad += is_bad(s);
+    for (std::size_t s = 0; s < holders.size(); ++s) bad += badness(s);
     std::vector<Segment> segments;
     double from = lower;
     const auto close = [&](double to) {
@@ -333,9 +416,9 @@ class WeightSearch {
     };
     for (const Event& e : events) {
       if (e.y > from) close(e.y);
-      bad -= is_bad(e.simplex);
+      bad -= badness(e.simplex);
       holders[e.simplex] += e.change;
-      bad += is_bad(e.simplex);
+      bad += badness(e.simplex);
     }
     close(upper);
     return segments;
@@ -396,6 +479,8 @@ class WeightSearch {
   std::vector<std::vector<std::pair<double, std::uint32_t>>> near_;
   std::vector<Star> stars_;
   std::set<std::uint32_t> changed_;
+  bool exudes_ = false;                              // whether slivers count
+  std::unordered_map<std::uint64_t, bool> slivers_;  // by key
   CellMemory<K> flat_;
   CellMemory<K + 1> lifted_;
 };
@@ -420,6 +505,19 @@ std::vector<std::uint32_t> AddWeights(const FittedCloud& cloud,
   }
   return changed;
 }
+
+template <int K>
+std::vector<double> FindExudingWeights(const FittedCloud& cloud, FunctionRef<void(double)> done) {
+  std::vector<std::uint32_t> all(cloud.size);
+  std::iota(all.begin(), all.end(), 0u);
+  std::vector<double> weights(cloud.size, 0.0);
+  WeightSearch<K> search(cloud, all, weights);
+  if (!search.RunOnAll(done)) return {};
+  for (std::uint32_t p = 0; p < cloud.size; ++p) weights[p] = search.weight(p);
+  return weights;
+}
+
+template std::vector<double> FindExudingWeights<3>(const FittedCloud&, FunctionRef<void(double)>);
 
 template std::vector<std::uint32_t> AddWeights<1>(const FittedCloud&,
                                                   const std::vector<std::uint32_t>&,

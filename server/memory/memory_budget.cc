@@ -16,6 +16,8 @@ constexpr std::uint64_t kStarBytes[] = {0, 420, 330, 4300, 25'000, 150'000};
 static_assert(std::size(kStarBytes) == core::kMaxDimension + 1);
 constexpr std::uint64_t kEmptyMeshBytes = std::uint64_t{1} << 16;  // one with nothing in it
 constexpr std::uint64_t kReconstructedBytes = 500;  // of a point, beside it and its tangent basis
+// Besides, where weights are sought by which tetrahedra can be proved: neighbours, stars, slivers.
+constexpr std::uint64_t kWeighedBytes = 4000;
 constexpr std::uint64_t kFinishedBytes = std::uint64_t{1} << 14;  // without history and seeds
 constexpr std::uint64_t kCallBytes = std::uint64_t{1} << 15;      // that sends nothing
 constexpr std::uint64_t kLeastOfStreams = std::uint64_t{4} << 20;
@@ -47,7 +49,8 @@ std::uint64_t EstimateReconstructionBytes(const core::ReconstructionSpecificatio
                                           std::uint64_t points) {
   const auto d = static_cast<std::uint64_t>(spec.ambient_dimension);
   const auto k = static_cast<std::uint64_t>(spec.dimension);
-  return kEmptyMeshBytes + points * (sizeof(double) * d * (k + 1) + kReconstructedBytes);
+  const std::uint64_t weighed = k == 3 && spec.reach ? kWeighedBytes : 0;
+  return kEmptyMeshBytes + points * (sizeof(double) * d * (k + 1) + kReconstructedBytes + weighed);
 }
 
 std::uint64_t EstimateFinishedBytes(const core::Specification& spec) {

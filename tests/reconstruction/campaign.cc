@@ -119,6 +119,8 @@ std::vector<Kind> ProvedKinds() {
   add("torus", 1500, true, true);
   add("torus", 5000, false, true);
   add("klein", 5000, false, true);
+  add("so3", 2500, true, true);
+  add("t3", 6000, true, true);
   add("torus", 15000, true, false);
   add("s2", 3000, true, false);
   return kinds;

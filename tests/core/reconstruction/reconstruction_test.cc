@@ -397,5 +397,19 @@ TEST(DeclaredReach, ProvesFromGivenTangents) {
   }
 }
 
+TEST(DeclaredReach, ProvesThreeManifoldsByWeightsThatExude) {
+  const Sample sample = Draw(Of("so3", 1800, true));
+  ReconstructionSpecification spec = SpecOf(3, 9);
+  spec.noise = 0;
+  spec.reach = sample.reach;
+  const auto result = Reconstruct(spec, {sample.points, sample.tangents});
+  ASSERT_TRUE(result);
+  const Certificate& proved = result->report.certificate;
+  EXPECT_EQ(proved.level, CertificateLevel::kProved)
+      << proved.verdict << (proved.warnings.empty() ? "" : proved.warnings.front());
+  EXPECT_TRUE(IsRight(Count(3, result->simplices, SizeOf(sample.points)), sample));
+  EXPECT_GT(Places(*result, Place::kWeighted), 0u);
+}
+
 }  // namespace
 }  // namespace stellate::core
