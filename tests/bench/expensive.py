@@ -49,7 +49,10 @@ class ClosestPointsAlone:
         return self._oracle.closest_point(x)
 
 
-def questions_by_round(oracle, epsilon: float, **options) -> tuple[list[int], int]:
+def questions_by_round(
+    oracle, epsilon: float, **options
+) -> tuple[list[int], stellate.report.Counts]:
+    """What each round asked, tangent spaces included; a slow listener sees several rounds as one."""
     asked: dict[int, int] = {}
 
     def see(progress) -> None:
@@ -57,9 +60,9 @@ def questions_by_round(oracle, epsilon: float, **options) -> tuple[list[int], in
 
     mesh = stellate.mesh(oracle, epsilon, on_progress=see, **options)
     end = mesh.report.counts
-    asked[end.rounds] = end.queries
+    asked[end.rounds] = end.queries + end.tangent_queries
     totals = [asked[r] for r in sorted(asked)]
-    return [b - a for a, b in zip([0, *totals], totals)], len(mesh.points)
+    return [b - a for a, b in zip([0, *totals], totals) if b > a], end
 
 
 def seconds_of(rounds: Sequence[int], workers: int, seconds: float) -> float:
@@ -80,11 +83,11 @@ def print_table() -> None:
     for name, oracle, epsilon in CASES:
         for words, asked in (("closest points", ClosestPointsAlone(oracle)), ("all", oracle)):
             for ahead in (False, True):
-                rounds, vertices = questions_by_round(asked, epsilon, speculative=ahead)
+                rounds, counts = questions_by_round(asked, epsilon, speculative=ahead)
                 times = " | ".join(told(seconds_of(rounds, w, SECONDS)) for w in WORKERS)
                 print(
-                    f"| {name} | {epsilon} | {words} | {'yes' if ahead else 'no'} | {vertices:,} "
-                    f"| {sum(rounds):,} | {len(rounds)} | {times} |"
+                    f"| {name} | {epsilon} | {words} | {'yes' if ahead else 'no'} | {counts.vertices:,} "
+                    f"| {sum(rounds):,} | {counts.rounds} | {times} |"
                 )
 
 
