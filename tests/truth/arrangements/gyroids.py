@@ -6,6 +6,8 @@
 Skeletal: where g is above a level; sheets: where it is within two. The level is that which leaves the
 volume fraction. Each is cut by a box, a ball or a cylinder at a random place, or periodic. epsilon is a
 share of what the level set bends and of what the sheet is thick, sampled; so thin sheets are fine meshes.
+Near a level with singular points that would be too fine everywhere, and epsilon is coarse: what is not
+certified there is meshed once more, with sizes that follow what is seen, as the verdict says (size_rate).
 """
 
 from __future__ import annotations
@@ -30,6 +32,7 @@ norm = np.linalg.norm
 _HALF = 1.8  # of the box's side; the ball's and the cylinder's radius is a little more and less
 _SHARE = 0.35  # of what bends and of half of what is thick
 _LEAST, _MOST = 0.14, 0.5  # of epsilon, where a period is 2 pi
+_MOST_EVEN, _MOST_GRADED = 60_000, 200_000  # vertices
 _GRID = 72
 _COARSE = 0.4
 _STARTS = 700
@@ -292,17 +295,21 @@ def one(
     motion = Motion.random(rng, 3)
     if place != "periodic":
         some = [Cut(level, place, rng.uniform(0, 2 * np.pi, 3), motion) for _ in range(places)]
-        run.meeting, cut = max(((c.sharpest(), c) for c in some), key=lambda both: both[0])
+        there = [c for c in some if c.pieces() > 0] or some
+        run.meeting, cut = max(((c.sharpest(), c) for c in there), key=lambda both: both[0])
     began = time.monotonic()
     try:
         if place == "periodic":
             epsilon = min(level.epsilon, 0.4)
             cell, oracle = periodic(level)
-            mesh = stellate.mesh(oracle, epsilon, server=server, max_vertices=60_000)
+            size = epsilon
         else:
             epsilon = level.epsilon
+            oracle, size = cut.oracle(), epsilon * motion.scale
+        mesh = stellate.mesh(oracle, size, server=server, max_vertices=_MOST_EVEN)
+        if run.coarse and not mesh.certified:
             mesh = stellate.mesh(
-                cut.oracle(), epsilon * motion.scale, server=server, max_vertices=60_000
+                oracle, size, server=server, max_vertices=_MOST_GRADED, size_rate=_SHARE
             )
     except stellate.StellateError as error:
         run.outcome, run.words = "refused", f"{error.reason}: {error}"
