@@ -44,7 +44,7 @@ void BoundaryClaims::ReportFaces() {
     report.simplices = face.simplices.size() / (static_cast<std::size_t>(face.dimension) + 1);
     report.components = shape.components;
     report.euler_characteristic = shape.euler_characteristic;
-    report.volume = MeasureTogether(x_.mesh, face.dimension, face.simplices).volume;
+    report.volume = MeasureVolume(x_.mesh, face.dimension, face.simplices);
     report.betti = BettiNumbers(face.dimension, static_cast<std::int64_t>(shape.components),
                                 shape.euler_characteristic, face.simplices);
     c.faces.push_back(report);
@@ -77,7 +77,7 @@ void BoundaryClaims::JudgeFaces(const ClosedOff& closed) {
 void BoundaryClaims::JudgeVolume() {
   Certificate& c = x_.certificate;
   const auto k = static_cast<std::size_t>(x_.mesh.k);
-  c.volume = MeasureTogether(x_.mesh, x_.mesh.k, *x_.mesh.simplices).volume;
+  c.volume = MeasureVolume(x_.mesh, x_.mesh.k, *x_.mesh.simplices);
   if (x_.mesh.d != x_.mesh.k) return;
   using Facet = std::array<std::uint32_t, kMaxDimension>;
   std::vector<Facet> ends;

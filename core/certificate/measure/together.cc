@@ -41,10 +41,8 @@ double LargestCosine(const MeshView& mesh, int dimension, const std::uint32_t* i
   return std::isnan(largest) ? 1 : std::min(largest, 1.0);
 }
 
-}  // namespace
-
-Together MeasureTogether(const MeshView& mesh, int dimension,
-                         const std::vector<std::uint32_t>& simplices) {
+Together Measure(const MeshView& mesh, int dimension, const std::vector<std::uint32_t>& simplices,
+                 bool with_angles) {
   const auto width = static_cast<std::size_t>(dimension) + 1;
   const std::size_t count = simplices.size() / width;
   struct Part {
@@ -58,7 +56,7 @@ Together MeasureTogether(const MeshView& mesh, int dimension,
       const double* corners[kMaxDimension + 1];
       for (std::size_t i = 0; i < width; ++i) corners[i] = mesh.Point(ids[i]);
       part.volume += MeasureSimplex({corners, width}, mesh.d).volume;
-      if (dimension >= 2) part.cosine = std::max(part.cosine, LargestCosine(mesh, dimension, ids));
+      if (with_angles) part.cosine = std::max(part.cosine, LargestCosine(mesh, dimension, ids));
     }
     parts[chunk] = part;
   });
@@ -68,9 +66,21 @@ Together MeasureTogether(const MeshView& mesh, int dimension,
     all.volume += part.volume;
     cosine = std::max(cosine, part.cosine);
   }
-  if (dimension >= 2 && count > 0)
+  if (with_angles && count > 0)
     all.min_dihedral_degrees = std::acos(cosine) * 180 / std::numbers::pi;
   return all;
+}
+
+}  // namespace
+
+double MeasureVolume(const MeshView& mesh, int dimension,
+                     const std::vector<std::uint32_t>& simplices) {
+  return Measure(mesh, dimension, simplices, false).volume;
+}
+
+Together MeasureTogether(const MeshView& mesh, int dimension,
+                         const std::vector<std::uint32_t>& simplices) {
+  return Measure(mesh, dimension, simplices, dimension >= 2);
 }
 
 double EnclosedVolume(const MeshView& mesh, const std::vector<std::uint32_t>& simplices,

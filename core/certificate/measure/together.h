@@ -17,7 +17,11 @@ struct Together {
   double min_dihedral_degrees = 0;
 };
 
-// Measures simplices, dimension + 1 ids each. The sums do not depend on the number of threads.
+// Returns the volume of simplices together, dimension + 1 ids each. The sum does not depend on the
+// number of threads.
+double MeasureVolume(const MeshView& mesh, int dimension,
+                     const std::vector<std::uint32_t>& simplices);
+// Measures their angles, too.
 Together MeasureTogether(const MeshView& mesh, int dimension,
                          const std::vector<std::uint32_t>& simplices);
 
