@@ -105,10 +105,7 @@ void RoundTrip<K>::FindKnown() {
       const double* point = candidates_.points.col(c).data();
       const double far = Distance(point, stars.sample().Point(targets[i].star), K) +
                          kCovering * engine_.criteria().epsilon;
-      bool deep = true;
-      stars.sample().ForEachWithin(point, far,
-                                   [&](std::uint32_t p) { deep &= stars.sample().walls(p) == 0; });
-      known_[static_cast<std::size_t>(c)] = deep;
+      known_[static_cast<std::size_t>(c)] = !stars.sample().boundary_tree().AnyWithin(point, far);
     }
   });
   if (candidates_.planned.size() == 0 && !known_.empty() &&
