@@ -9,8 +9,9 @@
 
 #include "core/batch.h"
 #include "core/certificate/claims/boundary_claims.h"
+#include "core/certificate/claims/clearance_dips.h"
 #include "core/certificate/claims/examination.h"
-#include "core/index/ball_tree.h"
+#include "core/certificate/claims/sheet.h"
 
 namespace stellate::core {
 
@@ -42,33 +43,10 @@ class SheetClaims {
   std::vector<QueryBlock> QuestionsWhereClearancesDip();
 
  private:
-  // The mesh of a wall.
-  struct Sheet {
-    explicit Sheet(int d) : tree(d, &barycentres) {}
-    Sheet(Sheet&&) = delete;  // the tree borrows the barycentres
-
-    std::vector<std::uint32_t> simplices;    // k ids each
-    std::vector<double> barycentres;         // d each
-    std::vector<double> outward;             // d each: out of the mesh, within the tangent space of
-                                             // the simplex that ends there
-    std::vector<double> radii;               // around the barycentres
-    std::vector<double> directions;          // k - 1 of d numbers each: orthonormal, along it
-    std::vector<std::pair<int, int>> sides;  // as of FaceMesh
-    double largest_radius = 0;
-    BallTree tree;  // of the barycentres, by these radii
-    // By clear point: its clearance over its distance from the mesh; 0: on the wall, or so near the
-    // mesh that the ratio has no meaning.
-    std::vector<double> shares;
-  };
   std::unique_ptr<Sheet> SheetOf(int wall) const;
   Eigen::VectorXd OutwardAt(const std::uint32_t* facet, std::pair<int, int> sides) const;
   std::vector<std::uint32_t> Spread(const Sheet& sheet, const Eigen::MatrixXd& barycentres,
                                     const std::vector<double>& radii) const;
-  double DistanceFrom(const Sheet& sheet, const double* y) const;
-  double SquaredBoundFrom(const Sheet& sheet, std::uint32_t f, const double* y,
-                          double squared) const;
-  void TakeShares(std::size_t wall);
-  std::vector<std::uint32_t> Dips(const Sheet& sheet, const BallTree& tree) const;
   QueryBlock QuestionsOf(std::size_t wall, Eigen::MatrixXd points) const;
   // A point of M on a wall, and the conormal there, d each; borrowed.
   struct End {
@@ -83,6 +61,7 @@ class SheetClaims {
   Examination& x_;
   BoundaryClaims& boundary_;
   std::vector<std::unique_ptr<Sheet>> sheets_;  // by wall
+  std::vector<ClearanceDips> dips_;             // the same
   EndsOfManifold& ends_;
   const ClearPoints& clear_;
   std::size_t looked_at_ = 0;  // clear points whose dips were asked about
