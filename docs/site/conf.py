@@ -10,7 +10,7 @@ import re
 import sys
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "clients" / "python"))
+sys.path[:0] = [str(ROOT / "clients" / "python"), str(ROOT / "docs" / "site")]
 
 project = "Stellate"
 release = (ROOT / "VERSION").read_text().strip()
@@ -25,7 +25,7 @@ exclude_patterns = [
     "**/target", "**/_generated", "**/dist",
 ]  # fmt: skip
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "breathe"]
+extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.napoleon", "breathe", "formulas"]
 myst_heading_anchors = 4
 source_suffix = {".md": "markdown", ".rst": "restructuredtext"}
 
@@ -46,6 +46,7 @@ html_title = f"Stellate {release}"
 html_copy_source = False
 html_static_path = [str(ROOT / "docs" / "site" / "static")]
 html_css_files = ["site.css"]
+html_js_files = ["copy.js"]
 html_extra_path = [str(ROOT / "docs" / "site" / "top")]
 html_theme_options = {"navigation_with_keys": True}
 

@@ -124,12 +124,33 @@ def can_fail() -> None:
         assert len(broken(pathlib.Path(folder))) == 3
 
 
+def plain(html: pathlib.Path) -> list[str]:
+    """Formulas that are not typeset, and code without a button that copies it."""
+    found = []
+    for page, wanted in (
+        ("docs/gallery/index.html", "Dimension 2 in <em>R</em><sup>3</sup>"),
+        ("docs/howto/equations.html", "<em>R</em><sup>d\u2212k</sup>"),
+        ("README.html", "O(<em>\u03b5</em><sup>\u2212k</sup>)"),
+    ):
+        if wanted not in (html / page).read_text():
+            found.append(f"{page} does not have {wanted}")
+    for page in html.rglob("*.html"):
+        text = page.read_text()
+        if '<div class="highlight"' in text and "_static/copy.js" not in text:
+            found.append(f"{page.relative_to(html)} has code that no button copies")
+    shown = (html / "docs/gallery/index.html").read_text()
+    for picture in (ROOT / "docs/gallery").glob("*.png"):
+        if shown.count(f"_images/{picture.name}") < 2:
+            found.append(f"the gallery has no thumbnail of {picture.name}, or no picture")
+    return found
+
+
 def main() -> int:
     can_fail()
     programs, output = map(pathlib.Path, sys.argv[1:])
     subprocess.run([ROOT / "docs/build", "--bin", programs, "--output", output], check=True)
     html = output / "html"
-    wrong = broken(html) + unstyled(html) + missing(html, programs)
+    wrong = broken(html) + unstyled(html) + plain(html) + missing(html, programs)
     print("\n".join(wrong) or f"{len(list(html.rglob('*.html')))} pages, all whole")
     return 1 if wrong else 0
 
