@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <fstream>
+#include <functional>
 #include <memory>
 #include <system_error>
 #include <utility>
@@ -34,12 +35,15 @@ constexpr auto kHealthLimit = std::chrono::seconds(5);
 
 // SIGHUP has something to say only where there are files to read again; elsewhere it ends the
 // process.
-sigset_t Signals(const Config& config) {
+sigset_t Signals(const Flags& flags) {
+  const Config& config = flags.config;
   sigset_t signals;
   sigemptyset(&signals);
   sigaddset(&signals, SIGTERM);
   sigaddset(&signals, SIGINT);
-  if (!config.token_file.empty() || !config.tls_certificate.empty()) sigaddset(&signals, SIGHUP);
+  if (!flags.config_file.empty() || !config.token_file.empty() || !config.tls_certificate.empty()) {
+    sigaddset(&signals, SIGHUP);
+  }
   return signals;
 }
 
@@ -87,13 +91,15 @@ bool WriteReadyFile(const std::string& path, const std::string& address) {
 }
 
 stellate::core::Expected<std::unique_ptr<Server>> StartServer(const Flags& flags, pid_t parent,
-                                                              const sigset_t& signals) {
+                                                              const sigset_t& signals,
+                                                              bool* told_to_reload) {
   auto threads = CheckThreads(LeastThreads());
   if (!threads.ok()) return tl::unexpected(std::move(threads));
   try {
     return Server::Start(flags.config, stellate::core::Mesher::Create, [&] {
       if (flags.exit_with_parent && getppid() != parent) return true;
       const int signal = WaitForSignal(signals, 0);
+      if (signal == SIGHUP) *told_to_reload = true;
       return signal != 0 && signal != SIGHUP;
     });
   } catch (const std::system_error& error) {  // each recorded mesh that goes on needs a thread
@@ -105,13 +111,30 @@ stellate::core::Expected<std::unique_ptr<Server>> StartServer(const Flags& flags
   }
 }
 
+// A file that cannot be used leaves all as it is.
+void Reload(Server* server, const Flags& flags, int argc, const char* const* argv) {
+  server->ReloadFiles();
+  if (flags.config_file.empty()) return;
+  const auto next = ReadSettingsAgain(argc, argv);
+  const stellate::core::Status status = next ? server->Reload(*next) : next.error();
+  if (!status.ok()) {
+    Log(LogLevel::kError, {},
+        stellate::core::Message("all settings stay as they were: ", flags.config_file, ": ",
+                                status.message));
+    return;
+  }
+  SetLogLevel(server->config()->log_level);
+  Log(LogLevel::kInfo, {}, "read " + flags.config_file + " again");
+}
+
 // Returns when it is time to stop. kAtOnce: nobody is left to wait for.
 enum class Why { kTold, kAtOnce, kLost };
-Why ServeUntilTold(Server* server, const sigset_t& signals, bool with_parent, pid_t parent) {
+Why ServeUntilTold(Server* server, const sigset_t& signals, bool with_parent, pid_t parent,
+                   const std::function<void()>& reload) {
   while (true) {
     const int signal = WaitForSignal(signals, 250);
     if (signal == SIGHUP) {
-      server->ReloadFiles();
+      reload();
     } else if (signal != 0) {
       Log(LogLevel::kInfo, {}, "stopping", stellate::server::LogFields().Add("signal", signal));
       return Why::kTold;
@@ -137,13 +160,14 @@ int main(int argc, char** argv) {
 
   stellate::server::GiveBackLargeBlocks();
   // Before gRPC starts its threads, which inherit the mask: then sigtimedwait alone sees them.
-  const sigset_t signals = Signals(config);
+  const sigset_t signals = Signals(flags);
   pthread_sigmask(SIG_BLOCK, &signals, nullptr);
   signal(SIGPIPE, SIG_IGN);
   StartLogging(config.log_level, config.log_format);
   stellate::server::TakeLibraryLogs();
 
-  auto server = StartServer(flags, parent, signals);
+  bool reload_is_due = false;
+  auto server = StartServer(flags, parent, signals, &reload_is_due);
   if (!server && server.error().code == stellate::core::StatusCode::kCancelled) return 0;
   if (!server) return Fail(server.error().message, kExitUsage);
   const std::string& address = (*server)->address();
@@ -155,8 +179,11 @@ int main(int argc, char** argv) {
     return Fail("cannot write --ready-file " + config.ready_file, 1);
   }
 
-  const Why why = ServeUntilTold(server->get(), signals, flags.exit_with_parent, parent);
-  const std::chrono::duration<double> drain(why == Why::kTold ? config.drain_seconds : 0);
+  const auto reload = [&, &flags = flags] { Reload(server->get(), flags, argc, argv); };
+  if (reload_is_due) reload();
+  const Why why = ServeUntilTold(server->get(), signals, flags.exit_with_parent, parent, reload);
+  const std::chrono::duration<double> drain(why == Why::kTold ? (*server)->config()->drain_seconds
+                                                              : 0);
   const bool clean = (*server)->Stop(std::chrono::duration_cast<Clock::duration>(drain), [&] {
     const int signal = WaitForSignal(signals, 0);
     return signal != 0 && signal != SIGHUP;

@@ -11,6 +11,8 @@
 #include <string_view>
 #include <thread>
 
+#include "server/base/log.h"
+#include "server/config/settings.h"
 #include "server/drain.h"
 #include "server/net/guarded_server.h"
 #include "server/postgres/database.h"
@@ -39,13 +41,6 @@ CallKind KindOf(const Authenticator& authenticator, std::string_view path,
   return authenticator.Knows(authorization) ? CallKind::kOwners : CallKind::kRefused;
 }
 
-StoreLimits ToStoreLimits(const Config& config) {
-  return {config.max_meshes, config.keep_finished_meshes,
-          std::chrono::duration_cast<Clock::duration>(
-              std::chrono::duration<double>(config.keep_finished_seconds)),
-          config.owner_meshes};
-}
-
 core::Expected<std::unique_ptr<Journal>> OpenDirectory(const Config& config) {
   const std::uint64_t share = config.owner_journal_bytes > 0
                                   ? config.owner_journal_bytes
@@ -71,20 +66,19 @@ core::Expected<std::unique_ptr<Journal>> OpenRecords(const Config& config,
 class Server::Impl {
  public:
   Impl(const Config& config, Session::MesherFactory factory)
-      : state(config, ToStoreLimits(config), std::move(factory)), rpcs(&state) {}
+      : asked(config), state(WithDefaults(config), std::move(factory)), rpcs(&state) {}
 
   Status ListenForPrometheus() {
-    if (state.config.metrics_listen.empty()) return Status::Ok();
+    const std::string& address = asked.metrics_listen;
+    if (address.empty()) return Status::Ok();
     return state.metrics.Listen(
-        state.config.metrics_listen, [this] { return state.store.All(); },
-        [this] { return !state.draining; });
+        address, [this] { return state.store.All(); }, [this] { return state.WhyNoNewMeshes(); });
   }
 
   // Takes up the meshes of an earlier server.
   Status OpenJournal(const std::function<bool()>& give_up) {
-    if (!IsDurable(state.config)) return Status::Ok();
-    auto journal = state.config.database.empty() ? OpenDirectory(state.config)
-                                                 : OpenRecords(state.config, give_up);
+    if (!IsDurable(asked)) return Status::Ok();
+    auto journal = asked.database.empty() ? OpenDirectory(asked) : OpenRecords(asked, give_up);
     if (!journal) return std::move(journal.error());
     state.journal = std::move(*journal);
     state.store.RecordIn([this] { return state.journal->NewMesh(); });
@@ -100,7 +94,7 @@ class Server::Impl {
     builder.RegisterService(&rpcs);
     builder.RegisterCallbackGenericService(&unknown_rpcs);
     auto started = GuardedServer::Start(
-        state.config, &builder,
+        asked, &builder,
         {[authenticator = state.authenticator](std::string_view path,
                                                std::string_view authorization) {
            return KindOf(*authenticator, path, authorization);
@@ -126,6 +120,7 @@ class Server::Impl {
     });
   }
 
+  Config asked;  // as it was given, zeros that stand for something among it
   ServerState state;
   Rpcs rpcs;
   UnknownRpcs unknown_rpcs;
@@ -155,7 +150,7 @@ core::Expected<std::unique_ptr<Server>> Server::Start(const Config& config,
 
   auto authenticator = Authenticator::Create(config);
   if (!authenticator) return tl::unexpected(std::move(authenticator.error()));
-  auto impl = std::make_unique<Impl>(WithDefaults(config), std::move(factory));
+  auto impl = std::make_unique<Impl>(config, std::move(factory));
   impl->state.authenticator = std::move(*authenticator);
   status = impl->OpenJournal(give_up);
   if (!status.ok()) return tl::unexpected(std::move(status));
@@ -182,6 +177,22 @@ void Server::ReloadFiles() {
   impl_->server->ReloadFiles();
   impl_->state.authenticator->Reload(/*force=*/true);
 }
+
+Status Server::Reload(const Config& next) {
+  Status status = Validate(next);
+  if (!status.ok()) return status;
+  const Changes changes = TakeOver(next, &impl_->asked);
+  impl_->state.Adopt(WithDefaults(impl_->asked));
+  for (const std::string& change : changes.taken) {
+    Log(LogLevel::kInfo, {}, "from now on " + change);
+  }
+  for (const std::string& key : changes.at_next_start) {
+    Log(LogLevel::kWarning, {}, key + " was changed: that holds from the next start on");
+  }
+  return Status::Ok();
+}
+
+std::shared_ptr<const Config> Server::config() const { return impl_->state.config(); }
 
 bool Server::Stop(Clock::duration drain, const std::function<bool()>& hurry) {
   Impl& impl = *impl_;

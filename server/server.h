@@ -32,6 +32,13 @@ class Server {
 
   // Reads the token file, and those of TLS, again, as happens by itself within seconds of a change.
   void ReloadFiles();
+  // Takes over from `next` the settings that may change while a server runs, for calls and meshes
+  // from now on, and logs them; Setting::live says which. Of the others it logs that they wait for
+  // the next start. kInvalidArgument, with nothing changed: `next` makes no sense. On one thread at
+  // a time.
+  core::Status Reload(const Config& next);
+  // What is in force.
+  std::shared_ptr<const Config> config() const;
 
   // Stops: no new meshes, then up to `drain` for running ones to end, as long as any of them has a
   // worker; then the rest is suspended, where there is a journal, or cancelled, and every stream

@@ -90,11 +90,13 @@ void LogFor(const std::string& party, LogLevel level, const LogContext& context,
 
 void StartLogging(LogLevel level, LogFormat wanted) {
   format = wanted;
-  Logger().set_level(ToSpdlog(level));
+  SetLogLevel(level);
   Logger().set_pattern(wanted == LogFormat::kJson
                            ? R"({"time":"%Y-%m-%dT%H:%M:%S.%e%z","level":"%l",%v})"
                            : "%Y-%m-%d %H:%M:%S.%e %^%l%$ %v");
 }
+
+void SetLogLevel(LogLevel level) { Logger().set_level(ToSpdlog(level)); }
 
 bool LogEnabled(LogLevel level) { return Logger().should_log(ToSpdlog(level)); }
 

@@ -13,6 +13,9 @@ enum class LogFormat { kText, kJson };
 // Starts logging to stderr. Before it, and in tests, nothing is logged below warnings.
 void StartLogging(LogLevel level, LogFormat format);
 
+// From now on. Any thread.
+void SetLogLevel(LogLevel level);
+
 // What a line is about; `mesh` empty when it is about the server.
 struct LogContext {
   std::string mesh;

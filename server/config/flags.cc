@@ -68,20 +68,25 @@ void AddSetting(CLI::App* app, const Setting& setting, Config* config) {
   if (*setting.group != '\0') option->group(setting.group);
 }
 
-}  // namespace
+// The command line, which writes into `flags` what it reads.
+struct CommandLine {
+  explicit CommandLine(Flags* flags);
+  void Read(int argc, const char* const* argv, Flags* flags);
 
-ParsedFlags ParseFlags(int argc, const char* const* argv) {
-  ParsedFlags parsed;
-  Flags& flags = parsed.flags;
+  CLI::App app{"stellated: meshes smooth manifolds for clients that serve their oracles."};
   bool print_config = false;
-  CLI::App app("stellated: meshes smooth manifolds for clients that serve their oracles.");
+};
+
+CommandLine::CommandLine(Flags* into) {
+  Flags& flags = *into;
   app.option_defaults()->always_capture_default();
   app.set_version_flag("--version", std::string("stellated ") + Version());
   app.set_config("--config", "",
-                 "File of lines \"KEY = VALUE\", the keys being these flags without dashes");
+                 "File of lines \"KEY = VALUE\", the keys being these flags without dashes. Read "
+                 "again after SIGHUP: --print-config says which settings change then");
   app.allow_config_extras(CLI::config_extras_mode::error);
 
-  const auto add_command = [&app](const char* flag, auto* value, const char* help) {
+  const auto add_command = [this](const char* flag, auto* value, const char* help) {
     using T = std::decay_t<decltype(*value)>;
     if constexpr (std::is_same_v<T, bool>) {
       app.add_flag(flag, *value, help)->configurable(false);
@@ -110,33 +115,59 @@ ParsedFlags ParseFlags(int argc, const char* const* argv) {
               "read, keep the damaged files beside it, say what is lost, and exit; 0 if that "
               "succeeds, else 1");
   for (const Setting& setting : Settings()) AddSetting(&app, setting, &flags.config);
+}
 
+void CommandLine::Read(int argc, const char* const* argv, Flags* flags) {
+  app.parse(argc, argv);
+  if (app.get_config_ptr()->count() > 0)
+    flags->config_file = app.get_config_ptr()->as<std::string>();
+}
+
+// Its words are about INI files; what it could not place is their last part.
+std::string ComplaintOf(const CLI::ConfigError& error) {
+  std::string words = error.what();
+  if (words.find("not allowed") != std::string::npos) return words;
+  const std::string key = words.substr(words.rfind(' ') + 1);
+  if (key.ends_with(".++")) {  // as CLI11 writes its beginning
+    return "there is a section [" + key.substr(0, key.find('.')) +
+           "]: settings stand in the file without sections";
+  }
+  return "there is no setting \"" + key + "\": --print-config prints those that there are";
+}
+
+}  // namespace
+
+ParsedFlags ParseFlags(int argc, const char* const* argv) {
+  ParsedFlags parsed;
+  CommandLine line(&parsed.flags);
   try {
-    app.parse(argc, argv);
-    if (print_config) {
-      std::fputs(ToConfigFile(flags.config).c_str(), stdout);
+    line.Read(argc, argv, &parsed.flags);
+    if (line.print_config) {
+      std::fputs(ToConfigFile(parsed.flags.config).c_str(), stdout);
       parsed.exit_status = 0;
     }
   } catch (const CLI::ConfigError& error) {
-    // Its words are about INI files; what it could not place is their last part.
-    const std::string words = error.what();
-    const std::string key = words.substr(words.rfind(' ') + 1);
-    const bool known = words.find("not allowed") != std::string::npos;
-    const bool in_section = key.ends_with(".++");  // as CLI11 writes its beginning
-    const std::string no_section = "there is a section [" + key.substr(0, key.find('.')) +
-                                   "]: settings stand in the file without sections";
-    const std::string no_setting =
-        "there is no setting \"" + key + "\": --print-config prints those that there are";
-    std::fprintf(stderr, "stellated: --config: %s\n",
-                 (known        ? words
-                  : in_section ? no_section
-                               : no_setting)
-                     .c_str());
+    std::fprintf(stderr, "stellated: --config: %s\n", ComplaintOf(error).c_str());
     parsed.exit_status = kExitUsage;
   } catch (const CLI::ParseError& error) {
-    parsed.exit_status = app.exit(error) == 0 ? 0 : kExitUsage;
+    parsed.exit_status = line.app.exit(error) == 0 ? 0 : kExitUsage;
   }
   return parsed;
+}
+
+core::Expected<Config> ReadSettingsAgain(int argc, const char* const* argv) {
+  Flags flags;
+  CommandLine line(&flags);
+  std::string complaint;
+  try {
+    line.Read(argc, argv, &flags);
+    return flags.config;
+  } catch (const CLI::ConfigError& error) {
+    complaint = ComplaintOf(error);
+  } catch (const CLI::Error& error) {
+    complaint = error.what();
+  }
+  return core::Refuse(core::StatusCode::kInvalidArgument, std::move(complaint));
 }
 
 }  // namespace stellate::server

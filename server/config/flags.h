@@ -1,6 +1,7 @@
 #pragma once
 
 #include <optional>
+#include <string>
 
 #include "server/config/config.h"
 
@@ -8,6 +9,7 @@ namespace stellate::server {
 
 struct Flags {
   Config config;
+  std::string config_file;  // that --config names; empty: none
   bool health_check = false;
   std::string health_certificate, health_key;  // shown by it; empty: the server's own
   std::string health_service;  // whose health --health-check asks for; empty: the whole server's
@@ -23,5 +25,9 @@ struct ParsedFlags {
   std::optional<int> exit_status;
 };
 ParsedFlags ParseFlags(int argc, const char* const* argv);
+
+// The settings that the same command line makes now, as its configuration file may have changed.
+// kInvalidArgument: what is wrong with that.
+core::Expected<Config> ReadSettingsAgain(int argc, const char* const* argv);
 
 }  // namespace stellate::server

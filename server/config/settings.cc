@@ -15,6 +15,7 @@ constexpr double kYear = 366 * 86400.0;  // seconds
 constexpr double kMoment = 0.001;
 constexpr double kBytes = 1e15;  // more than there is
 constexpr double kMebibyte = 1024.0 * 1024.0;
+constexpr bool kLive = true;
 
 constexpr char kSafety[] = "Safety";
 constexpr char kServerLimits[] = "Limits of the server";
@@ -98,10 +99,11 @@ const std::vector<Setting>& Settings() {
        "File of lines \"OWNER TOKEN\": clients must send one of these tokens, and see their "
        "owner's meshes alone. Read again when it changes, or after SIGHUP"},
 
-      {kServerLimits, "--max-meshes", &Config::max_meshes, "Meshes running at a time", 1, 100'000},
+      {kServerLimits, "--max-meshes", &Config::max_meshes, "Meshes running at a time", 1, 100'000,
+       kLive},
       {kServerLimits, "--max-memory-bytes", &Config::max_memory_bytes,
        "Estimated memory of all meshes; 0: three quarters of what the machine or container has", 0,
-       kBytes},
+       kBytes, kLive},
       {kServerLimits, "--max-journal-bytes", &Config::max_journal_bytes,
        "Size of the record in --data-dir or --database; 0: what there is room for", 0, kBytes},
       {kServerLimits, "--max-message-bytes", &Config::max_message_bytes,
@@ -118,53 +120,56 @@ const std::vector<Setting>& Settings() {
        4, 1'000'000},
 
       {kOwnerLimits, "--owner-meshes", &Config::owner_meshes,
-       "Meshes running at a time; 0: as many as the server allows", 0, 100'000},
+       "Meshes running at a time; 0: as many as the server allows", 0, 100'000, kLive},
       {kOwnerLimits, "--keep-finished-meshes", &Config::keep_finished_meshes,
        "Finished meshes that can be read, of all clients together where they are not "
        "authenticated. "
        "What is beyond is forgotten, first what has no vertex, nothing else within a minute of its "
        "end",
-       0, 1'000'000},
+       0, 1'000'000, kLive},
       {kOwnerLimits, "--owner-memory-bytes", &Config::owner_memory_bytes,
-       "Estimated memory of an owner's meshes; 0: half of the server's", 0, kBytes},
+       "Estimated memory of an owner's meshes; 0: half of the server's", 0, kBytes, kLive},
       {kOwnerLimits, "--owner-journal-bytes", &Config::owner_journal_bytes,
        "Size of an owner's records; 0: half of --max-journal-bytes, or of what the disk of "
        "--data-dir has for them at the start, or no limit with --database",
        0, kBytes},
 
       {kMeshLimits, "--max-vertices", &Config::max_vertices, "Vertices", 1,
-       std::numeric_limits<std::uint32_t>::max()},
+       std::numeric_limits<std::uint32_t>::max(), kLive},
       {kMeshLimits, "--max-coordinates", &Config::max_coordinates,
-       "Vertices times ambient dimension", 1, static_cast<double>(std::uint64_t{1} << 48)},
-      {kMeshLimits, "--max-dimension", &Config::max_dimension, "Largest k", 1, core::kMaxDimension},
+       "Vertices times ambient dimension", 1, static_cast<double>(std::uint64_t{1} << 48), kLive},
+      {kMeshLimits, "--max-dimension", &Config::max_dimension, "Largest k", 1, core::kMaxDimension,
+       kLive},
       {kMeshLimits, "--max-ambient-dimension", &Config::max_ambient_dimension, "Largest d", 2,
-       core::kMaxAmbientDimension},
+       core::kMaxAmbientDimension, kLive},
       {kMeshLimits, "--max-rounds", &Config::max_rounds, "Rounds", 1,
-       static_cast<double>(std::uint64_t{1} << 40)},
-      {kMeshLimits, "--max-workers", &Config::max_workers, "Workers at a time", 1, 100'000},
-      {kMeshLimits, "--max-watchers", &Config::max_watchers, "Watchers at a time", 1, 100'000},
+       static_cast<double>(std::uint64_t{1} << 40), kLive},
+      {kMeshLimits, "--max-workers", &Config::max_workers, "Workers at a time", 1, 100'000, kLive},
+      {kMeshLimits, "--max-watchers", &Config::max_watchers, "Watchers at a time", 1, 100'000,
+       kLive},
 
       {kWorkers, "--max-in-flight", &Config::max_in_flight,
-       "Chunks of queries that one worker holds at a time", 1, 64},
+       "Chunks of queries that one worker holds at a time", 1, 64, kLive},
       {kWorkers, "--check-share", &Config::check_share,
        "Share of the queries that is asked of two workers, where there are several, to compare "
        "the answers; 0: none",
-       0, 1},
+       0, 1, kLive},
 
       {kTimes, "--worker-wait", &Config::worker_wait_seconds,
-       "How long a mesh waits for a worker, unless its client says", kMoment, kYear},
+       "How long a mesh waits for a worker, unless its client says", kMoment, kYear, kLive},
       {kTimes, "--answer-seconds", &Config::answer_seconds,
        "How long a worker may take for a chunk, or since it last said that it is busy with it, "
        "unless its client says",
-       kMoment, kYear},
+       kMoment, kYear, kLive},
       {kTimes, "--busy-seconds", &Config::busy_seconds,
-       "How long a worker may take for a chunk in all, unless its client says", kMoment, kYear},
+       "How long a worker may take for a chunk in all, unless its client says", kMoment, kYear,
+       kLive},
       {kTimes, "--max-wait", &Config::max_wait_seconds,
        "Most that a client may ask for of these three; 0: an hour, and 30 days with --data-dir or "
        "--database",
-       0, kYear},
+       0, kYear, kLive},
       {kTimes, "--keep-finished-seconds", &Config::keep_finished_seconds,
-       "How long a finished mesh can be read", 0, kYear},
+       "How long a finished mesh can be read", 0, kYear, kLive},
       {kTimes, "--hello-seconds", &Config::hello_seconds,
        "Time for a connection's handshake, and for a worker's first message", kMoment, kYear},
       {kTimes, "--request-seconds", &Config::request_seconds,
@@ -174,11 +179,12 @@ const std::vector<Setting>& Settings() {
       {kTimes, "--unread-seconds", &Config::unread_seconds,
        "How long a watcher may leave a message unread; then its stream ends as CANCELLED, and it "
        "may come back with the last revision that it has",
-       kMoment, kYear},
+       kMoment, kYear, kLive},
       {kTimes, "--database-patience", &Config::database_patience_seconds,
        "How long a mesh waits for a --database that does not answer, before it fails", 0, kYear},
       {kTimes, "--drain-seconds", &Config::drain_seconds,
-       "Time for meshes that are served to end after SIGTERM; a second signal ends it", 0, kYear},
+       "Time for meshes that are served to end after SIGTERM; a second signal ends it", 0, kYear,
+       kLive},
       {kTimes, "--keepalive", &Config::keepalive_seconds, "Time between pings to a silent client",
        0.1, kYear},
       {kTimes, "--keepalive-timeout", &Config::keepalive_timeout_seconds,
@@ -186,7 +192,8 @@ const std::vector<Setting>& Settings() {
 
       {kLogs, "--metrics-listen", &Config::metrics_listen,
        "HOST:PORT to answer Prometheus at, http://HOST:PORT/metrics; default: nowhere"},
-      {kLogs, "--log-level", &Config::log_level, "trace, debug, info, warning, error or off"},
+      {kLogs, "--log-level", &Config::log_level, "trace, debug, info, warning, error or off", 0, 0,
+       kLive},
       {kLogs, "--log-format", &Config::log_format, "text or json, on standard error"},
   };
   return settings;
@@ -218,10 +225,25 @@ std::string ToConfigFile(const Config& config) {
   for (const Setting& setting : Settings()) {
     if (setting.group != group) text += Message("\n# ", setting.group, "\n");
     group = setting.group;
-    text +=
-        Message("\n# ", setting.help, "\n", setting.Key(), " = ", TextOf(config, setting), "\n");
+    text += Message("\n# ", setting.help, setting.live ? ". SIGHUP reads it again" : "", "\n",
+                    setting.Key(), " = ", TextOf(config, setting), "\n");
   }
   return text;
+}
+
+Changes TakeOver(const Config& next, Config* config) {
+  Changes changes;
+  for (const Setting& setting : Settings()) {
+    std::visit(
+        [&](auto field) {
+          if (next.*field == config->*field) return;
+          if (!setting.live) return changes.at_next_start.push_back(setting.Key());
+          config->*field = next.*field;
+          changes.taken.push_back(Message(setting.Key(), " = ", TextOf(next, setting)));
+        },
+        setting.field);
+  }
+  return changes;
 }
 
 const char* LogLevelName(LogLevel level) { return NameIn(kLevels, level); }

@@ -19,6 +19,7 @@ struct Setting {
   Field field;
   const char* help;
   double least = 0, most = 0;  // of a number
+  bool live = false;           // may change while the server runs; see TakeOver
 
   std::string Key() const { return flag + 2; }
 };
@@ -31,6 +32,13 @@ core::Status CheckRanges(const Config& config);
 
 // A configuration file with every setting, as --config reads it.
 std::string ToConfigFile(const Config& config);
+
+// Takes over from `next` what may change while a server runs.
+struct Changes {
+  std::vector<std::string> taken;          // "max-meshes = 8"
+  std::vector<std::string> at_next_start;  // keys that differ, and hold from then on
+};
+Changes TakeOver(const Config& next, Config* config);
 
 // Names of the choices, and back. nullptr or false: no such choice.
 const char* LogLevelName(LogLevel level);

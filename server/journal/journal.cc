@@ -1,6 +1,10 @@
 #include "server/journal/journal.h"
 
+#include <unistd.h>
+
 #include <algorithm>
+#include <cerrno>
+#include <cstring>
 #include <filesystem>
 #include <system_error>
 #include <utility>
@@ -99,6 +103,17 @@ std::optional<Refused> Journal::RefuseNewMesh(const std::string& owner, std::uin
   return Refused({core::StatusCode::kLimitExceeded,
                   Message("the disk of the server's record has room for only ", disk.available,
                           " more bytes: delete meshes that are no longer needed")});
+}
+
+std::string Journal::WhyNoNewMeshes() const {
+  if (IsLost()) return "another server has taken the records of the meshes";
+  if (IsAway()) return "the database does not answer";
+  const std::string& directory = options_.directory;
+  if (!directory.empty() && access(directory.c_str(), W_OK | X_OK) != 0) {
+    return Message("the directory of the record cannot be written to: ", std::strerror(errno));
+  }
+  const auto refused = RefuseNewMesh("", kFirstRecordBytes);
+  return refused ? refused->message : "";
 }
 
 // False: its records contradict each other.

@@ -21,6 +21,9 @@ struct JournalOptions {
                                   // 0: no limit
 };
 
+// What a mesh records before it gets anywhere: its specification without seeds, and some answers.
+inline constexpr std::uint64_t kFirstRecordBytes = std::uint64_t{1} << 16;
+
 // Half of the space that a journal may use: its limit, or its size and the free space of the disk.
 std::uint64_t DefaultOwnerBytes(const std::string& directory, std::uint64_t max_bytes);
 
@@ -54,6 +57,9 @@ class Journal {
   // Returns why the first `bytes` of a new mesh of `owner` cannot be recorded, and what to do;
   // nothing if they can. Any thread; does not wait.
   std::optional<Refused> RefuseNewMesh(const std::string& owner, std::uint64_t bytes) const;
+
+  // Why no new mesh can be recorded, whatever its owner; empty: it can. Any thread; does not wait.
+  std::string WhyNoNewMeshes() const;
 
   // Where the records are away, writes of meshes fail from now on, in place of waiting. Any thread.
   void StopWaiting() { shared_->StopWaiting(); }

@@ -126,6 +126,11 @@ std::uint64_t MemoryBudget::BytesOf(const Account* account) const {
   return account->bytes_;
 }
 
+void MemoryBudget::SetLimits(Limits limits) {
+  const std::lock_guard lock(mutex_);
+  limits_ = limits;
+}
+
 std::uint64_t MemoryBudget::total() const {
   const std::lock_guard lock(mutex_);
   return total_;

@@ -47,7 +47,7 @@ class MemoryBudget {
   // Open calls have a budget of their own, an eighth of the limits (and 4 MiB at least), so that
   // finished meshes that fill the budget of meshes can still be read.
   enum class Of { kMeshes, kStreams };
-  explicit MemoryBudget(Limits limits, Of what = Of::kMeshes) : limits_(limits), what_(what) {}
+  explicit MemoryBudget(Limits limits, Of what = Of::kMeshes) : what_(what), limits_(limits) {}
 
   // The share of one mesh or call, released by the destructor.
   class Account {
@@ -87,6 +87,8 @@ class MemoryBudget {
   // For a new mesh or call of `owner`, with nothing in it.
   static std::unique_ptr<Account> Open(std::shared_ptr<MemoryBudget> budget, std::string owner);
 
+  // From now on. What is held stays held, where it is more: it may not grow.
+  void SetLimits(Limits limits);
   std::uint64_t total() const;
 
  private:
@@ -97,10 +99,10 @@ class MemoryBudget {
   void Release(Account* account);
   std::uint64_t BytesOf(const Account* account) const;
 
-  const Limits limits_;
   const Of what_;
   std::function<bool()> make_room_;
-  mutable std::mutex mutex_;
+  mutable std::mutex mutex_;  // of all that follows
+  Limits limits_;
   std::uint64_t total_ = 0;
   std::map<std::string, std::uint64_t> by_owner_;
 };

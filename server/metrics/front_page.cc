@@ -18,15 +18,13 @@ constexpr const char* kHead =
 
 }  // namespace
 
-std::string FrontPage(const Counts& counts, bool is_serving) {
+std::string FrontPage(const Counts& counts, const std::string& why_not) {
   std::ostringstream page;
   const auto row = [&page](const std::string& what, std::size_t count) {
     page << "<tr><td>" << what << "<td>" << count;
   };
   page << kHead << "<h1>stellated " << Version() << "</h1><p>"
-       << (is_serving ? "Serving."
-                      : "Draining: it takes no new meshes, and stops when those that are "
-                        "served have ended.")
+       << (why_not.empty() ? "Serving." : "No new meshes are taken: " + why_not + ".")
        << " Meshes are made, watched and ended over gRPC, at another address than this: "
           "<code>stellate top</code> and <code>stellate view</code> show "
           "them.<h2>Meshes</h2><table>";

@@ -158,7 +158,7 @@ class Metrics::Impl final : public SessionObserver {
   const std::shared_ptr<ProcessMetrics> process = std::make_shared<ProcessMetrics>();
   std::unique_ptr<PageServer> pages;
 
-  Page PageAt(std::string_view path, const Sessions& sessions, const IsServing& is_serving) const {
+  Page PageAt(std::string_view path, const Sessions& sessions, const WhyNot& why_not) const {
     if (path == "/metrics") {
       std::vector<MetricFamily> families = registry->Collect();
       for (const prometheus::Collectable* some :
@@ -169,11 +169,12 @@ class Metrics::Impl final : public SessionObserver {
               prometheus::TextSerializer().Serialize(families)};
     }
     if (path == "/healthz") {
-      if (is_serving()) return {200, "text/plain; charset=utf-8", "serving\n"};
-      return {503, "text/plain; charset=utf-8", "draining: no new meshes are taken\n"};
+      const std::string why = why_not();
+      if (why.empty()) return {200, "text/plain; charset=utf-8", "serving\n"};
+      return {503, "text/plain; charset=utf-8", "no new meshes are taken: " + why + "\n"};
     }
     if (path == "/")
-      return {200, "text/html; charset=utf-8", FrontPage(CountAll(sessions()), is_serving())};
+      return {200, "text/html; charset=utf-8", FrontPage(CountAll(sessions()), why_not())};
     return {404, "text/plain; charset=utf-8", "there are /, /healthz and /metrics\n"};
   }
 };
@@ -181,13 +182,11 @@ class Metrics::Impl final : public SessionObserver {
 Metrics::Metrics() : impl_(std::make_shared<Impl>()) {}
 Metrics::~Metrics() { StopListening(); }
 
-core::Status Metrics::Listen(const std::string& address, Sessions sessions, IsServing is_serving) {
+core::Status Metrics::Listen(const std::string& address, Sessions sessions, WhyNot why_not) {
   impl_->census = std::make_shared<Census>(sessions);
-  auto listening =
-      PageServer::Listen(address, [impl = impl_.get(), sessions = std::move(sessions),
-                                   is_serving = std::move(is_serving)](std::string_view path) {
-        return impl->PageAt(path, sessions, is_serving);
-      });
+  auto listening = PageServer::Listen(
+      address, [impl = impl_.get(), sessions = std::move(sessions), why_not = std::move(why_not)](
+                   std::string_view path) { return impl->PageAt(path, sessions, why_not); });
   if (!listening) {
     return {core::StatusCode::kFailedPrecondition,
             core::Message("cannot listen on ", address, ": ", listening.error().message,

@@ -22,11 +22,11 @@ class Metrics {
 
   // Returns the meshes, for the gauges. Must outlive StopListening.
   using Sessions = std::function<std::vector<std::shared_ptr<Session>>()>;
-  // Whether new meshes are accepted.
-  using IsServing = std::function<bool()>;
+  // Why no new meshes are taken; empty: they are.
+  using WhyNot = std::function<std::string()>;
   // Answers http://address from now on: /metrics for Prometheus, /healthz for probes, / for people.
   // kFailedPrecondition: the address is taken.
-  core::Status Listen(const std::string& address, Sessions sessions, IsServing is_serving);
+  core::Status Listen(const std::string& address, Sessions sessions, WhyNot why_not);
   int port() const;  // 0: does not listen
   void StopListening();
 

@@ -9,12 +9,6 @@
 #include "server/convert/mesh.h"
 
 namespace stellate::server {
-namespace {
-
-// What a mesh records before it gets anywhere: its specification, and some answers.
-constexpr std::uint64_t kFirstRecordBytes = std::uint64_t{1} << 16;
-
-}  // namespace
 
 void Audit(const Session& session, const Identity& caller, const std::string& peer,
            const char* action) {

@@ -44,7 +44,7 @@ class CreateStream final : public ServerStream<v1::CreateMeshRequest, v1::Mesh> 
  private:
   grpc::Status Declare(const v1::CreateMeshRequest& request) {
     if (state().draining) return ShuttingDown();
-    auto parsed = FromProto(request.spec(), state().config);
+    auto parsed = FromProto(request.spec(), *state().config());
     if (!parsed) return Refuse(state(), parsed.error(), "spec.");
     parsed->owner = caller().owner;
     if (request.mesh_id().empty()) return Begin(std::move(*parsed), nullptr);

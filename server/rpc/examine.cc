@@ -47,7 +47,7 @@ class ExamineStream final : public ServerStream<v1::ExamineRequest, v1::ExamineR
  private:
   grpc::Status Open(const v1::ExamineRequest& request) {
     if (state().draining) return ShuttingDown();
-    auto parsed = ReadSpec(request.spec(), state().config);
+    auto parsed = ReadSpec(request.spec(), *state().config());
     if (!parsed) return Refuse(state(), parsed.error(), "spec.");
     if (request.spec().limits().worker_wait_seconds() == 0) {
       auto& wait = parsed->timeouts.worker_wait;

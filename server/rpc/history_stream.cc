@@ -25,7 +25,7 @@ std::optional<grpc::Status> NoHistory(ServerState& state, const Session& session
   }
   if (waited < kHistoryWait) return std::nullopt;
   return Refuse(state,
-                {{"max-memory-bytes", core::Message(state.config.max_memory_bytes), "server"},
+                {{"max-memory-bytes", core::Message(state.config()->max_memory_bytes), "server"},
                  "the mesh is on the server's disk, and it has no memory to read it back: "
                  "ask again when other meshes have ended, or raise --max-memory-bytes"});
 }

@@ -55,7 +55,7 @@ class HistoryStream : public ServerStream<Request, Response>, public SessionWatc
   // The action in the log, after Choose; null: none.
   virtual const char* Action() const = 0;
   // Bytes of mesh in a message, after Choose.
-  virtual std::uint64_t PartBytes() const { return server::PartBytes(state().config); }
+  virtual std::uint64_t PartBytes() const { return server::PartBytes(*state().config()); }
   // (locked) The mesh has changed, or a second has passed.
   virtual void OnNews() {}
   // (locked) How long the client may leave a message unread. It can resume later.

@@ -37,7 +37,7 @@ grpc::Status ListMeshes(const Call& call, const v1::ListMeshesRequest& request,
     v1::Mesh* const mesh = response->add_meshes();
     ShowMesh(call, *page.sessions[i], mesh);
     bytes += mesh->ByteSizeLong();
-    const bool full = bytes >= ChunkBytes(call.state.config) / 2;
+    const bool full = bytes >= ChunkBytes(*call.state.config()) / 2;
     const bool last = i + 1 == page.sessions.size();
     if ((last && page.more) || (!last && full)) {
       response->set_next_page_token(std::to_string(page.numbers[i]));

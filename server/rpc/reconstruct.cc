@@ -102,7 +102,7 @@ class UploadStream final : public ServerStream<v1::PointsChunk, v1::ReconstructR
 
   void Declare(const v1::Reconstruction& spec) {
     if (state().draining) return Refuse(ShuttingDown());
-    auto declared = FromProto(spec, state().config);
+    auto declared = FromProto(spec, *state().config());
     if (!declared) return Refuse(server::Refuse(state(), declared.error(), "spec."));
     declared->owner = caller().owner;
     const PointsRequest& points = *declared->points;
@@ -110,7 +110,7 @@ class UploadStream final : public ServerStream<v1::PointsChunk, v1::ReconstructR
                              points.points * BytesOfPoint(points)};
     auto session = DeclareMesh({state(), caller(), peer()}, std::move(*declared), bytes);
     if (!session) return Refuse(session.error());
-    if (auto status = Attach(*session, PartBytes(state().config)); !status.ok()) {
+    if (auto status = Attach(*session, PartBytes(*state().config())); !status.ok()) {
       state().store.Delete((*session)->request().name);
       return Refuse(status);
     }
@@ -130,7 +130,8 @@ class UploadStream final : public ServerStream<v1::PointsChunk, v1::ReconstructR
       return Refuse(Refusal(v1::ERROR_REASON_INVALID_ARGUMENT,
                             "the mesh is made of the answers of an oracle, not of points", "mesh"));
     }
-    if (auto status = Attach(*mesh, PartBytes(state().config)); !status.ok()) return Refuse(status);
+    if (auto status = Attach(*mesh, PartBytes(*state().config())); !status.ok())
+      return Refuse(status);
     Audit(*session(), caller(), peer(), "upload");
     Join();
   }
@@ -201,7 +202,7 @@ class UploadStream final : public ServerStream<v1::PointsChunk, v1::ReconstructR
   void OnTick(TimePoint now) override {
     if (has_ended() || phase() != Phase::kIdle) return;
     if (session() == nullptr) {
-      const auto patience = std::chrono::duration<double>(state().config.hello_seconds);
+      const auto patience = std::chrono::duration<double>(state().config()->hello_seconds);
       if (now - opened_ <= patience) return;
       return EndLate(core::Message("no specification came within ", patience.count(),
                                    " seconds: send it first"));

@@ -213,7 +213,7 @@ class OracleStream final : public ServerStream<v1::ServeOracleRequest, v1::Serve
   bool IsStuck(TimePoint now) const override { return has_ended() && now - ended() > kGoodbye; }
 
   void OnTick(TimePoint now) override {
-    const auto patience = std::chrono::duration<double>(state().config.hello_seconds);
+    const auto patience = std::chrono::duration<double>(state().config()->hello_seconds);
     if (has_ended() || session() != nullptr || now - opened_ <= patience) return;
     ServerStream::End(Refusal(
         v1::ERROR_REASON_OUT_OF_ORDER,

@@ -2,6 +2,9 @@
 
 #include <atomic>
 #include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
 
 #include "server/auth/auth.h"
 #include "server/config/config.h"
@@ -13,20 +16,39 @@
 
 namespace stellate::server {
 
-// The state that all calls of a server share.
-struct ServerState {
-  ServerState(const Config& config_in, StoreLimits limits, Session::MesherFactory factory)
-      : config(config_in),
-        memory(std::make_shared<MemoryBudget>(
-            MemoryBudget::Limits{config.max_memory_bytes, config.owner_memory_bytes})),
-        stream_memory(std::make_shared<MemoryBudget>(
-            MemoryBudget::Limits{config.max_memory_bytes, config.owner_memory_bytes},
-            MemoryBudget::Of::kStreams)),
-        store(limits, std::move(factory)) {
-    memory->MakeRoomBy([this] { return store.UnloadHistories(); });
+// The settings in force, which may change while calls read them. Any thread.
+class SettingsInForce {
+ public:
+  explicit SettingsInForce(Config config) { Set(std::move(config)); }
+
+  // As they are now: they stay for who holds them.
+  std::shared_ptr<const Config> Get() const {
+    const std::lock_guard lock(mutex_);
+    return config_;
+  }
+  void Set(Config config) {
+    auto next = std::make_shared<const Config>(std::move(config));
+    const std::lock_guard lock(mutex_);
+    config_ = std::move(next);
   }
 
-  const Config config;
+ private:
+  mutable std::mutex mutex_;
+  std::shared_ptr<const Config> config_;
+};
+
+// The state that all calls of a server share.
+struct ServerState {
+  ServerState(const Config& config, Session::MesherFactory factory);
+
+  std::shared_ptr<const Config> config() const { return settings.Get(); }
+  // From now on; what was admitted by other limits stays. REQUIRES: `config` differs only in
+  // settings that may change while a server runs, and has no zeros that stand for something.
+  void Adopt(const Config& config);
+  // Why no client can begin a mesh; empty: they can.
+  std::string WhyNoNewMeshes() const;
+
+  SettingsInForce settings;
   const std::shared_ptr<MemoryBudget> memory, stream_memory;
   StreamRegistry streams;
   std::unique_ptr<Journal> journal;  // null: meshes live in memory alone

@@ -35,7 +35,7 @@ class WatchStream final : public HistoryStream<v1::WatchMeshRequest, v1::WatchMe
   Clock::duration Patience() const override {
     if (state().store.Find(session().request().name) == nullptr) return kUnreadPatience;
     return std::chrono::duration_cast<Clock::duration>(
-        std::chrono::duration<double>(state().config.unread_seconds));
+        std::chrono::duration<double>(state().config()->unread_seconds));
   }
 
   Step Next() override {

@@ -55,9 +55,14 @@ bool IsMeshName(const std::string& name) {
 }
 
 SessionStore::SessionStore(StoreLimits limits, Session::MesherFactory factory)
-    : limits_(limits), factory_(std::move(factory)) {}
+    : factory_(std::move(factory)), limits_(limits) {}
 
 SessionStore::~SessionStore() { Stop(TimePoint::max()); }
+
+void SessionStore::SetLimits(StoreLimits limits) {
+  const std::lock_guard lock(mutex_);
+  limits_ = limits;
+}
 
 Allowed<std::shared_ptr<Session>> SessionStore::Create(SessionOptions options) {
   const std::lock_guard lock(mutex_);
@@ -119,6 +124,7 @@ void SessionStore::Restore(SessionOptions options) {
   // The earlier of two meshes of one name was deleted before the later was made, in the last
   // instant of a server that was killed.
   Delete(options.request.name);
+  const std::lock_guard lock(mutex_);
   TimePoint over_since = TimePoint::max();
   if (options.record->end) {
     SessionEnd& end = *options.record->end;
@@ -129,7 +135,6 @@ void SessionStore::Restore(SessionOptions options) {
     end.time = std::max(end.time, options.record->create_time);
     end.elapsed_seconds = std::max(end.elapsed_seconds, 0.0);
   }
-  const std::lock_guard lock(mutex_);
   options.ports.on_replayed = [this] { Advance(); };
   const Entry& entry = AddLocked(std::move(options), over_since);
   if (entry.session->Over()) return;

@@ -44,6 +44,8 @@ class SessionStore {
   // already, if one has. kLimitExceeded: too many meshes are running, or the system has no further
   // thread.
   Allowed<std::shared_ptr<Session>> Create(SessionOptions options);
+  // From now on. Running meshes stay, also where they are more.
+  void SetLimits(StoreLimits limits);
   // Before the first Create.
   void RecordIn(JournalFactory new_journal) { new_journal_ = std::move(new_journal); }
   // Restores a mesh that an earlier server recorded. REQUIRES: options.journal and options.record
@@ -104,10 +106,10 @@ class SessionStore {
   // Deleted entries whose thread has ended and which no other thread holds; destroy them unlocked.
   std::vector<Entry> TakeDeadLocked();
 
-  const StoreLimits limits_;
   const Session::MesherFactory factory_;
   JournalFactory new_journal_;
   mutable std::mutex mutex_;
+  StoreLimits limits_;
   std::map<std::uint64_t, Entry> entries_;
   std::unordered_map<std::string, std::uint64_t> numbers_;
   std::vector<Entry> dying_;  // deleted; until their threads end and their watchers leave

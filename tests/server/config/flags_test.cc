@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <set>
@@ -148,6 +149,52 @@ TEST_F(FlagsTest, HelpHasEveryFlagOnce) {
     EXPECT_TRUE(flags.insert(setting.flag).second) << setting.flag;
     EXPECT_NE(out_.find(std::string("  ") + setting.flag), std::string::npos) << setting.flag;
   }
+}
+
+TEST_F(FlagsTest, TheFileCanBeReadAgain) {
+  WriteFile("max-meshes = 5\nmax-workers = 6\n");
+  const std::vector<const char*> argv = {"stellated", "--config", file_.c_str(), "--max-workers",
+                                         "9"};
+  const int argc = static_cast<int>(argv.size());
+  EXPECT_EQ(ParseFlags(argc, argv.data()).flags.config_file, file_);
+  WriteFile("max-meshes = 8\nmax-workers = 7\n");
+  const auto config = ReadSettingsAgain(argc, argv.data());
+  ASSERT_TRUE(config) << config.error().message;
+  EXPECT_EQ(config->max_meshes, 8u);
+  EXPECT_EQ(config->max_workers, 9u) << "the command line comes first then, too";
+
+  for (const auto& [text, word] : {std::pair{"max-meshes = many\n", "\"many\" but must be"},
+                                   {"max-meshs = 5\n", "no setting \"max-meshs\""},
+                                   {"max-meshes\n", "max-meshes"}}) {
+    WriteFile(text);
+    const auto bad = ReadSettingsAgain(argc, argv.data());
+    ASSERT_FALSE(bad) << text;
+    EXPECT_NE(bad.error().message.find(word), std::string::npos) << bad.error().message;
+  }
+  std::filesystem::remove(file_);
+  const auto gone = ReadSettingsAgain(argc, argv.data());
+  ASSERT_FALSE(gone);
+  EXPECT_NE(gone.error().message.find(file_), std::string::npos) << gone.error().message;
+}
+
+TEST_F(FlagsTest, OnlyLiveSettingsAreTakenOver) {
+  const Config next = Unlike({});
+  Config config;
+  const Changes changes = TakeOver(next, &config);
+  EXPECT_EQ(changes.taken.size() + changes.at_next_start.size(), Settings().size());
+  for (const Setting& setting : Settings()) {
+    std::visit(
+        [&](auto field) {
+          EXPECT_EQ(config.*field == next.*field, setting.live) << setting.flag;
+          EXPECT_EQ(config.*field == Config{}.*field, !setting.live) << setting.flag;
+        },
+        setting.field);
+  }
+  EXPECT_EQ(std::count(changes.taken.begin(), changes.taken.end(),
+                       "max-meshes = " + std::to_string(next.max_meshes)),
+            1);
+  EXPECT_EQ(std::count(changes.at_next_start.begin(), changes.at_next_start.end(), "listen"), 1);
+  EXPECT_TRUE(TakeOver(config, &config).taken.empty());
 }
 
 TEST_F(FlagsTest, EveryDefaultIsInItsRange) { EXPECT_TRUE(CheckRanges(Config{}).ok()); }

@@ -286,6 +286,53 @@ TEST_F(LiveRequestsTest, AVerdictEndsWithWhatTheOracleSaysOfItself) {
       << log;
 }
 
+TEST_F(LiveRequestsTest, LimitsChangeWithoutARestart) {
+  Config config;
+  config.max_meshes = 1;
+  Start(config);
+  const std::string running = CreateSphere();
+  v1::Mesh mesh;
+  EXPECT_EQ(LimitIn(Create(SpecOfSphere(), &mesh)), "max-meshes=1 of server");
+
+  config = *server_->config();
+  config.max_meshes = 2;
+  config.max_vertices = 1000;
+  config.max_message_bytes *= 2;
+  ::testing::internal::CaptureStderr();
+  EXPECT_TRUE(server_->Reload(config).ok());
+  const std::string log = ::testing::internal::GetCapturedStderr();
+  EXPECT_NE(log.find("max-message-bytes was changed: that holds from the next start on"),
+            std::string::npos)
+      << log;
+  EXPECT_EQ(log.find("max-meshes was changed"), std::string::npos) << log;
+  v1::ServerInfo info;
+  grpc::ClientContext context;
+  EXPECT_TRUE(stub_->GetServerInfo(&context, {}, &info).ok());
+  EXPECT_EQ(info.max_meshes(), 2u);
+  EXPECT_EQ(info.max_vertices(), 1000u);
+  EXPECT_EQ(info.max_message_bytes(), Config{}.max_message_bytes);
+  EXPECT_TRUE(Create(SpecOfSphere(), &mesh).ok());
+  v1::MeshSpec large = SpecOfSphere();
+  large.mutable_limits()->set_max_vertices(1001);
+  EXPECT_EQ(LimitIn(Create(large, &mesh)), "max-vertices=1000 of mesh");
+
+  // What makes no sense changes nothing.
+  Config wrong = config;
+  wrong.max_meshes = 3;
+  wrong.metrics_listen = "nowhere";
+  const core::Status status = server_->Reload(wrong);
+  EXPECT_EQ(status.code, core::StatusCode::kInvalidArgument);
+  EXPECT_NE(status.message.find("--metrics-listen"), std::string::npos) << status.message;
+  EXPECT_EQ(server_->config()->max_meshes, 2u);
+
+  // A lower limit ends no mesh that runs.
+  config.max_meshes = 1;
+  EXPECT_TRUE(server_->Reload(config).ok());
+  EXPECT_EQ(LimitIn(Create(SpecOfSphere(), &mesh)), "max-meshes=1 of server");
+  RawWorker worker(stub_.get(), running);
+  EXPECT_EQ(WatchToEnd(running).state(), v1::MESH_STATE_SUCCEEDED);
+}
+
 // Not a mesh that ends at once as JOURNAL_FULL.
 TEST_F(LiveRequestsTest, WithoutRoomInTheRecordThereIsNoNewMesh) {
   const ScratchDirectory directory;

@@ -138,6 +138,19 @@ TEST(MemoryBudget, OpenCallsHaveAnEighth) {
   EXPECT_FALSE(bob->Set(2 * kMebi));
 }
 
+TEST(MemoryBudget, LimitsMayChangeWhileItIsHeld) {
+  const auto budget = std::make_shared<MemoryBudget>(MemoryBudget::Limits{100, 80});
+  const auto alice = MemoryBudget::Open(budget, "alice");
+  EXPECT_FALSE(alice->Set(60));
+  budget->SetLimits({40, 30});
+  EXPECT_EQ(alice->bytes(), 60u) << "what is held stays held";
+  EXPECT_EQ(alice->Set(61)->limit->value, "40");
+  EXPECT_FALSE(alice->Set(35)) << "less is always allowed";
+  EXPECT_EQ(alice->Set(36)->limit->setting, "owner-memory-bytes");
+  budget->SetLimits({200, 100});
+  EXPECT_FALSE(alice->Set(100));
+}
+
 TEST(MemoryBudget, TheMachineIsMeasured) {
   EXPECT_GT(ResidentBytes(), std::uint64_t{1} << 20);
   EXPECT_GT(MachineBytes(), ResidentBytes());

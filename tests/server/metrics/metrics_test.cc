@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <fstream>
 #include <map>
 #include <regex>
@@ -241,9 +242,36 @@ TEST_F(MetricsTest, ProbesAndPeopleAreAnsweredToo) {
   do health = GetPage(port, "/healthz");
   while (health.find("HTTP/1.1 200") == 0);
   EXPECT_EQ(health.find("HTTP/1.1 503"), 0u) << health;
-  EXPECT_NE(GetPage(port, "/").find("Draining"), std::string::npos);
+  EXPECT_NE(GetPage(port, "/").find("draining"), std::string::npos);
+  EXPECT_NE(health.find("draining"), std::string::npos) << health;
   open = true;
   stopping.join();
+}
+
+TEST_F(MetricsTest, ProbesAreToldThatNoMeshCanBeRecorded) {
+  const ScratchDirectory directory;
+  Config config;
+  config.data_dir = directory / "data";
+  StartWithMetrics(config);
+  const int port = server_->metrics_port();
+  EXPECT_EQ(GetPage(port, "/healthz").find("HTTP/1.1 200"), 0u);
+  // As where a volume has gone, or has become read-only.
+  std::filesystem::rename(directory / "data", directory / "elsewhere");
+  const std::string health = GetPage(port, "/healthz");
+  EXPECT_EQ(health.find("HTTP/1.1 503"), 0u) << health;
+  EXPECT_NE(health.find("cannot be written to: No such file"), std::string::npos) << health;
+  std::filesystem::rename(directory / "elsewhere", directory / "data");
+  EXPECT_EQ(GetPage(port, "/healthz").find("HTTP/1.1 200"), 0u) << "it is back";
+  server_.reset();
+
+  config.max_journal_bytes = 100'000;  // no mesh begins with so little
+  StartWithMetrics(config);
+  const std::string full = GetPage(server_->metrics_port(), "/healthz");
+  EXPECT_EQ(full.find("HTTP/1.1 503"), 0u) << full;
+  EXPECT_NE(full.find("raise --max-journal-bytes"), std::string::npos) << full;
+  v1::Mesh mesh;
+  EXPECT_EQ(Create(SpecOfSphere(), &mesh).error_code(), grpc::StatusCode::RESOURCE_EXHAUSTED);
+  server_.reset();  // before its directory goes
 }
 
 TEST_F(MetricsTest, ATakenPortIsRefusedAndAStoppedServerAnswersNoMore) {
