@@ -6,6 +6,7 @@
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/server_builder.h>
 
+#include <atomic>
 #include <condition_variable>
 #include <mutex>
 #include <string_view>
@@ -49,11 +50,12 @@ core::Expected<std::unique_ptr<Journal>> OpenDirectory(const Config& config) {
 }
 
 core::Expected<std::unique_ptr<Journal>> OpenRecords(const Config& config,
+                                                     const std::function<void(bool)>& on_answer,
                                                      const std::function<bool()>& give_up) {
   const auto patience = std::chrono::duration_cast<Clock::duration>(
       std::chrono::duration<double>(config.database_patience_seconds));
-  auto records =
-      OpenDatabase({config.database, config.listen, config.max_journal_bytes, patience}, give_up);
+  auto records = OpenDatabase(
+      {config.database, config.listen, config.max_journal_bytes, patience, on_answer}, give_up);
   if (!records) return tl::unexpected(std::move(records.error()));
   const std::uint64_t share =
       config.owner_journal_bytes > 0 ? config.owner_journal_bytes : config.max_journal_bytes / 2;
@@ -70,15 +72,20 @@ class Server::Impl {
 
   Status ListenForPrometheus() {
     const std::string& address = asked.metrics_listen;
-    if (address.empty()) return Status::Ok();
+    if (address.empty() || state.metrics.port() != 0) return Status::Ok();
     return state.metrics.Listen(
-        address, [this] { return state.store.All(); }, [this] { return state.WhyNoNewMeshes(); });
+        address, [this] { return state.store.All(); },
+        [this] {
+          return is_listening ? state.WhyNoNewMeshes() : "it waits for its database, or stands by";
+        });
   }
 
   // Takes up the meshes of an earlier server.
   Status OpenJournal(const std::function<bool()>& give_up) {
     if (!IsDurable(asked)) return Status::Ok();
-    auto journal = asked.database.empty() ? OpenDirectory(asked) : OpenRecords(asked, give_up);
+    const auto on_answer = [this](bool yes) { state.metrics.DatabaseAnswers(yes); };
+    auto journal =
+        asked.database.empty() ? OpenDirectory(asked) : OpenRecords(asked, on_answer, give_up);
     if (!journal) return std::move(journal.error());
     state.journal = std::move(*journal);
     state.store.RecordIn([this] { return state.journal->NewMesh(); });
@@ -121,6 +128,7 @@ class Server::Impl {
   }
 
   Config asked;  // as it was given, zeros that stand for something among it
+  std::atomic<bool> is_listening{false};
   ServerState state;
   Rpcs rpcs;
   UnknownRpcs unknown_rpcs;
@@ -152,12 +160,16 @@ core::Expected<std::unique_ptr<Server>> Server::Start(const Config& config,
   if (!authenticator) return tl::unexpected(std::move(authenticator.error()));
   auto impl = std::make_unique<Impl>(config, std::move(factory));
   impl->state.authenticator = std::move(*authenticator);
+  // While this waits for the database, or stands by; unless the server that has it is on the same
+  // machine, and has the port.
+  if (!config.database.empty()) impl->ListenForPrometheus();
   status = impl->OpenJournal(give_up);
   if (!status.ok()) return tl::unexpected(std::move(status));
   status = impl->ListenForPrometheus();
   if (!status.ok()) return tl::unexpected(std::move(status));
   status = impl->Listen();
   if (!status.ok()) return tl::unexpected(std::move(status));
+  impl->is_listening = true;
   for (const char* name : {v1::Stellate::service_full_name(), kAlive}) {
     impl->server->grpc().GetHealthCheckService()->SetServingStatus(name, true);
   }

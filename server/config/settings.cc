@@ -181,7 +181,9 @@ const std::vector<Setting>& Settings() {
        "may come back with the last revision that it has",
        kMoment, kYear, kLive},
       {kTimes, "--database-patience", &Config::database_patience_seconds,
-       "How long a mesh waits for a --database that does not answer, before it fails", 0, kYear},
+       "How long a --database that does not answer is waited for, by a mesh before it fails, and "
+       "by a server that starts",
+       0, kYear},
       {kTimes, "--drain-seconds", &Config::drain_seconds,
        "Time for meshes that are served to end after SIGTERM; a second signal ends it", 0, kYear,
        kLive},

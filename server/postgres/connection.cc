@@ -41,6 +41,16 @@ void AppendElement(std::string_view element, std::string* bytes) {
   bytes->append(element);
 }
 
+// Defaults, before what the URL says. A line that is cut must not be waited for until TCP gives up
+// by itself, after a quarter of an hour.
+constexpr std::array kNames = {
+    "application_name", "connect_timeout",  "keepalives_idle", "keepalives_interval",
+    "keepalives_count", "tcp_user_timeout", "dbname",          static_cast<const char*>(nullptr)};
+
+std::array<const char*, kNames.size()> ValuesFor(const std::string& url) {
+  return {"stellated", "3", "5", "2", "3", "10000", url.c_str(), nullptr};
+}
+
 // The first of libpq's lines.
 std::string FirstLine(const char* words) {
   const std::string_view all(words);
@@ -84,19 +94,8 @@ std::int64_t Rows::Number(int row, int column) const {
 }
 
 core::Expected<std::unique_ptr<Connection>> Connection::Open(const std::string& url) {
-  // Defaults, before what the URL says. A line that is cut must not be waited for until TCP gives
-  // up by itself, after a quarter of an hour.
-  constexpr std::array kNames = {
-      "application_name", "connect_timeout",  "keepalives_idle", "keepalives_interval",
-      "keepalives_count", "tcp_user_timeout", "dbname"};
-  const std::array values = {"stellated", "3", "5", "2", "3", "10000", url.c_str()};
-  std::array<const char*, kNames.size() + 1> names{}, all{};
-  for (std::size_t i = 0; i < kNames.size(); ++i) {
-    names[i] = kNames[i];
-    all[i] = values[i];
-  }
   std::unique_ptr<Connection> made(
-      new Connection(PQconnectdbParams(names.data(), all.data(), /*expand_dbname=*/1)));
+      new Connection(PQconnectdbParams(kNames.data(), ValuesFor(url).data(), /*expand_dbname=*/1)));
   PGconn* const connection = made->connection_;
   if (connection == nullptr || PQstatus(connection) != CONNECTION_OK ||
       PQsetnonblocking(connection, 1) != 0) {
@@ -104,6 +103,11 @@ core::Expected<std::unique_ptr<Connection>> Connection::Open(const std::string& 
                         FirstLine(PQerrorMessage(connection)));
   }
   return made;
+}
+
+bool Connection::IsAway(const std::string& url) {
+  const PGPing answer = PQpingParams(kNames.data(), ValuesFor(url).data(), /*expand_dbname=*/1);
+  return answer == PQPING_NO_RESPONSE || answer == PQPING_REJECT;
 }
 
 // False: `stop` came a while ago, or the connection cannot be waited for.

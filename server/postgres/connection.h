@@ -52,6 +52,9 @@ class Connection {
  public:
   // `url`: what libpq takes, several hosts included. Waits for seconds. Errors: libpq's words.
   static core::Expected<std::unique_ptr<Connection>> Open(const std::string& url);
+  // After an Open that failed: whether nothing answers there, or not yet, so that it may succeed
+  // later. Waits for seconds.
+  static bool IsAway(const std::string& url);
   ~Connection() { PQfinish(connection_); }
   Connection(const Connection&) = delete;
   Connection& operator=(const Connection&) = delete;

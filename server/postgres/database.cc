@@ -24,7 +24,9 @@ core::Expected<std::unique_ptr<Records>> OpenDatabase(const DatabaseOptions& opt
                                                       const std::function<bool()>& give_up) {
   const auto url = ReadDatabaseUrl(options.setting);
   if (!url) return tl::unexpected(url.error());
-  auto lease = DatabaseLease::Take(*url, core::Message(HostName(), " ", options.server), give_up);
+  auto lease = DatabaseLease::Take(
+      *url, {core::Message(HostName(), " ", options.server), options.patience, options.on_answer},
+      give_up);
   if (!lease) return tl::unexpected(std::move(lease.error()));
   return PostgresRecords::Open(*url, std::move(*lease), {options.max_bytes, options.patience});
 }

@@ -48,13 +48,40 @@ std::optional<Sight> See(Connection* connection, const std::atomic<bool>& stop) 
 // What stands by until it may take the database.
 class Watch {
  public:
-  Watch(std::string url, std::string name) : url_(std::move(url)), name_(std::move(name)) {}
+  Watch(std::string url, const DatabaseLease::Options& options)
+      : url_(std::move(url)), options_(options) {}
+
+  // The first connection, and the tables: waits for a database that is not there yet.
+  core::Status Begin(const std::function<bool()>& give_up) {
+    const TimePoint began = Clock::now();
+    core::Status status = Open();
+    for (bool has_said = false; !status.ok(); status = Open()) {
+      connection_.reset();
+      if (!Connection::IsAway(url_)) return status;
+      Note(false);
+      const std::chrono::duration<double> waited = Clock::now() - began, most = options_.patience;
+      if (waited >= most) {
+        return {StatusCode::kFailedPrecondition,
+                Message("the database of --database has not answered for ", waited.count(),
+                        " seconds (--database-patience): ", status.message)};
+      }
+      if (!std::exchange(has_said, true)) {
+        Log(LogLevel::kError, {},
+            Message("waiting for the database, up to ", most.count(),
+                    " seconds: ", status.message));
+      }
+      std::this_thread::sleep_for(kPause);
+      if (give_up()) return {StatusCode::kCancelled, "stopped while the database was away"};
+    }
+    Note(true);
+    return status;
+  }
 
   core::Status Open() {
     auto opened = Connection::Open(url_);
     if (!opened) {
       return {StatusCode::kFailedPrecondition,
-              Message("the database of --database does not answer: ", opened.error().message)};
+              Message("the database of --database cannot be opened: ", opened.error().message)};
     }
     connection_ = std::move(*opened);
     return PrepareSchema(connection_.get());
@@ -64,6 +91,7 @@ class Watch {
   core::Expected<std::optional<std::int64_t>> TryTake() {
     if (connection_ == nullptr && !Open().ok()) connection_.reset();
     const auto now = connection_ == nullptr ? std::nullopt : See(connection_.get(), never_);
+    Note(now.has_value());
     if (!now) {
       connection_.reset();
       seen_.reset();  // silence counts while the database answers
@@ -81,10 +109,13 @@ class Watch {
       return std::nullopt;
     }
     Rows taken;
-    const Outcome outcome = connection_->Run(
-        kTake,
-        Parameters().Add(now->term).Add(now->beats).Add(name_).Add(std::int64_t{kJournalVersion}),
-        &taken, never_);
+    const Outcome outcome = connection_->Run(kTake,
+                                             Parameters()
+                                                 .Add(now->term)
+                                                 .Add(now->beats)
+                                                 .Add(options_.name)
+                                                 .Add(std::int64_t{kJournalVersion}),
+                                             &taken, never_);
     if (outcome == Outcome::kFault || outcome == Outcome::kFull) {
       return core::Refuse(
           StatusCode::kFailedPrecondition,
@@ -106,7 +137,12 @@ class Watch {
                 "delete them, or choose another database"));
   }
 
-  const std::string url_, name_;
+  void Note(bool answers) const {
+    if (options_.on_answer) options_.on_answer(answers);
+  }
+
+  const std::string url_;
+  const DatabaseLease::Options& options_;
   const std::atomic<bool> never_{false};
   std::unique_ptr<Connection> connection_;
   std::optional<Sight> seen_;
@@ -117,9 +153,9 @@ class Watch {
 }  // namespace
 
 core::Expected<std::unique_ptr<DatabaseLease>> DatabaseLease::Take(
-    const std::string& url, const std::string& name, const std::function<bool()>& give_up) {
-  Watch watch(url, name);
-  core::Status status = watch.Open();
+    const std::string& url, const Options& options, const std::function<bool()>& give_up) {
+  Watch watch(url, options);
+  core::Status status = watch.Begin(give_up);
   if (!status.ok()) return tl::unexpected(std::move(status));
   while (!give_up()) {
     const auto term = watch.TryTake();

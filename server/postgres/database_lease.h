@@ -27,11 +27,16 @@ inline constexpr auto kBeat = std::chrono::seconds(1);
 //   ... WHERE term = (*lease)->term() ...
 class DatabaseLease {
  public:
-  // Waits until no other server holds the database, for ever if need be. `name`: tells this server
-  // to those that stand by. kFailedPrecondition: the database does not answer at the beginning, or
-  // another version of stellated recorded meshes in it; kCancelled: `give_up` said so.
+  struct Options {
+    std::string name;                     // tells this server to those that stand by
+    Clock::duration patience{};           // with a database that does not answer yet
+    std::function<void(bool)> on_answer;  // whether it does, while this waits; may be empty
+  };
+  // Waits until the database answers, and then until no other server holds it, for ever if need be.
+  // kFailedPrecondition: it does not answer within the patience, refuses this server, or another
+  // version of stellated recorded meshes in it; kCancelled: `give_up` said so.
   static core::Expected<std::unique_ptr<DatabaseLease>> Take(const std::string& url,
-                                                             const std::string& name,
+                                                             const Options& options,
                                                              const std::function<bool()>& give_up);
   // Lets another server have it immediately, unless the database is away.
   ~DatabaseLease();

@@ -201,10 +201,10 @@ TEST(DatabaseUrl, ARefusalSaysWhatToDo) {
     EXPECT_NE(refused.error().message.find(words), std::string::npos) << refused.error().message;
     EXPECT_EQ(refused.error().message.find("secret"), std::string::npos) << "it shows the password";
   }
-  const auto away =
-      OpenDatabase({"postgresql:///meshes?host=/nowhere", "", 0}, [] { return true; });
+  const auto away = OpenDatabase(
+      {"postgresql:///meshes?host=/nowhere", "", 0, Clock::duration::zero()}, [] { return true; });
   ASSERT_FALSE(away);
-  EXPECT_NE(away.error().message.find("does not answer"), std::string::npos)
+  EXPECT_NE(away.error().message.find("has not answered for"), std::string::npos)
       << away.error().message;
 }
 

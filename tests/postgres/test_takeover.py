@@ -372,6 +372,22 @@ def test_a_server_without_its_database_can_be_stopped(servers):
         control("start")
 
 
+def test_a_server_waits_for_a_database_that_is_not_there_yet(servers):
+    control("stop", "-m", "immediate")
+    try:
+        first, second = servers("first"), servers("second")
+        wait_for(lambda: "waiting for the database" in first.log())
+        wait_for(lambda: "waiting for the database" in second.log())
+        assert not first.sees_database() and not first.is_ready()
+        assert second.end(signal.SIGTERM) == 0, "it can be stopped"
+    finally:
+        control("start")
+    wait_for(first.is_ready)
+    assert first.sees_database()
+    with stellate.Client(first.address) as client:
+        assert client.create(manifolds.Torus(), EPSILON).state == "WAITING"
+
+
 def test_refusals(tmp_path):
     def refusal(*flags: str) -> str:
         command = [stellate.server.find_stellated(), "--listen", "127.0.0.1:0", *flags]
@@ -382,4 +398,8 @@ def test_refusals(tmp_path):
     url = os.environ["STELLATE_TEST_DATABASE"]
     assert "give one of them" in refusal("--database", url, "--data-dir", str(tmp_path))
     assert "write the URL into a file" in refusal("--database", "postgresql://a:b@/c")
-    assert "does not answer" in refusal("--database", url.replace("/postgres?", "/nothing?"))
+    nothing = refusal("--database", url.replace("/postgres?", "/nothing?"))
+    assert "cannot be opened" in nothing and "does not exist" in nothing
+    away = url.split("host=")[0] + f"host={tmp_path}"
+    said = refusal("--database", away, "--database-patience", "0.1")
+    assert "has not answered for" in said and "--database-patience" in said
