@@ -22,6 +22,8 @@
 #include "server/config/listen_address.h"
 #include "server/net/health_check.h"
 #include "server/net/tls.h"
+#include "server/postgres/database.h"
+#include "server/salvage/copy.h"
 #include "server/salvage/salvage.h"
 #include "server/server.h"
 
@@ -78,6 +80,20 @@ int RunOnDataDir(const Flags& flags) {
   const auto found = flags.salvage ? SalvageDataDir(path) : VerifyDataDir(path);
   if (!found) return Fail(found.error().message, 1);
   std::fputs(found->c_str(), stdout);
+  return 0;
+}
+
+int RunCopy(const Flags& flags) {
+  StartLogging(flags.config.log_level, flags.config.log_format);
+  const auto open = [&flags](const std::string& setting) {
+    const std::chrono::duration<double> patience(flags.config.database_patience_seconds);
+    return OpenDatabase(
+        {setting, "that copies", 0, std::chrono::duration_cast<Clock::duration>(patience), {}},
+        [] { return false; });
+  };
+  const auto done = CopyMeshes(flags.copy_meshes[0], flags.copy_meshes[1], open);
+  if (!done) return Fail(done.error().message, 1);
+  std::fputs(done->c_str(), stdout);
   return 0;
 }
 
@@ -157,6 +173,7 @@ int main(int argc, char** argv) {
   const Config& config = flags.config;
   if (flags.health_check) return RunHealthCheck(flags);
   if (flags.verify_data_dir || flags.salvage) return RunOnDataDir(flags);
+  if (!flags.copy_meshes.empty()) return RunCopy(flags);
 
   stellate::server::GiveBackLargeBlocks();
   // Before gRPC starts its threads, which inherit the mask: then sigtimedwait alone sees them.

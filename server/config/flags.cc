@@ -114,6 +114,13 @@ CommandLine::CommandLine(Flags* into) {
               "Where the record in --data-dir is damaged, begin a new one with all that can be "
               "read, keep the damaged files beside it, say what is lost, and exit; 0 if that "
               "succeeds, else 1");
+  app.add_option("--copy-meshes", flags.copy_meshes,
+                 "Copy all meshes from one data directory or database (a URL, or a file that has "
+                 "it) to another, read them back, say what was done, and exit; 0 if all are there, "
+                 "else 1. No server may run on either. Broken off, it goes on with the same words")
+      ->type_name("FROM TO")
+      ->expected(2)
+      ->configurable(false);
   for (const Setting& setting : Settings()) AddSetting(&app, setting, &flags.config);
 }
 

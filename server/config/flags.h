@@ -2,6 +2,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "server/config/config.h"
 
@@ -15,6 +16,7 @@ struct Flags {
   std::string health_service;  // whose health --health-check asks for; empty: the whole server's
   bool exit_with_parent = false;
   bool verify_data_dir = false, salvage = false;  // instead of serving
+  std::vector<std::string> copy_meshes;           // the same: from where, and to where; else empty
 };
 
 // Reads the command line and the configuration file that it names; the command line takes

@@ -48,6 +48,9 @@ constexpr char kMeasure[] =
 constexpr char kRead[] =
     "SELECT seal, bytes FROM stellate.records WHERE mesh = $1 AND kind = $2 AND number = $3 AND "
     "part = $4";
+constexpr char kList[] =
+    "SELECT kind::int8, number, part::int8 FROM stellate.records WHERE mesh = $1 "
+    "ORDER BY kind, number, part";
 // Answers and histories are large: of them it is enough to know that there are some.
 constexpr char kLoad[] =
     "SELECT mesh, kind::int8, number, part::int8, seal, bytes FROM stellate.records "
@@ -267,6 +270,17 @@ Records::Found PostgresRecords::Read(const Place& place, std::string* record) {
   *record = rows.Bytes(0, 1);
   const auto seal = static_cast<std::uint64_t>(rows.Number(0, 0));
   return SealOf(*record, place) == seal ? Found::kYes : Found::kDamaged;
+}
+
+bool PostgresRecords::ListPlaces(std::int64_t mesh, std::vector<Place>* places) {
+  Rows rows;
+  if (!Run(kList, Parameters().Add(mesh), &rows)) return false;
+  places->clear();
+  for (int row = 0; row < rows.count(); ++row) {
+    places->push_back({mesh, static_cast<RecordKind>(rows.Number(row, 0)), rows.Number(row, 1),
+                       rows.Number(row, 2)});
+  }
+  return true;
 }
 
 std::uint64_t PostgresRecords::BytesOf(std::int64_t mesh) const {

@@ -43,6 +43,7 @@ class PostgresRecords final : public Records {
   void Abandon() override { Clear(); }
   bool RemoveSome(std::int64_t mesh, Kinds kinds, bool* done) override;
   Found Read(const Place& place, std::string* record) override;
+  bool ListPlaces(std::int64_t mesh, std::vector<Place>* places) override;
   std::uint64_t BytesOf(std::int64_t mesh) const override;
   Trouble trouble() const override { return trouble_; }
   void StopWaiting() override { stopping_ = true; }

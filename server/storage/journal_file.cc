@@ -72,6 +72,19 @@ JournalFile::Found JournalFile::Read(const Place& place, std::string* record) {
   return SealOf(*record, place) == seal ? Found::kYes : Found::kDamaged;
 }
 
+bool JournalFile::ListPlaces(std::int64_t mesh, std::vector<Place>* places) {
+  Statement rows(*database_,
+                 "SELECT kind, number, part FROM records WHERE mesh = ? ORDER BY kind, number, "
+                 "part");
+  rows.Bind(0, mesh);
+  places->clear();
+  while (rows.Next()) {
+    places->push_back(
+        {mesh, static_cast<RecordKind>(rows.Number(0)), rows.Number(1), rows.Number(2)});
+  }
+  return !rows.failed();
+}
+
 std::uint64_t JournalFile::BytesOf(std::int64_t mesh) const {
   const auto it = bytes_.find(mesh);
   return it == bytes_.end() ? 0 : it->second;

@@ -47,6 +47,7 @@ class JournalFile final : public Records {
   bool SyncMark() override { return mark_ == nullptr || mark_->Sync(); }
 
   Found Read(const Place& place, std::string* record) override;
+  bool ListPlaces(std::int64_t mesh, std::vector<Place>* places) override;
 
   std::uint64_t BytesOf(std::int64_t mesh) const override;
   Trouble trouble() const override { return {database_->IsFull(), database_->error()}; }

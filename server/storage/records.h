@@ -5,6 +5,7 @@
 #include <map>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "server/records/journal_format.h"
 
@@ -51,6 +52,8 @@ class Records {
 
   enum class Found { kYes, kNo, kDamaged };
   virtual Found Read(const Place& place, std::string* record) = 0;
+  // The places of all records of a mesh, ascending.
+  virtual bool ListPlaces(std::int64_t mesh, std::vector<Place>* places) = 0;
 
   // Bytes of all records of a mesh.
   virtual std::uint64_t BytesOf(std::int64_t mesh) const = 0;

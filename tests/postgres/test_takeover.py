@@ -388,6 +388,33 @@ def test_a_server_waits_for_a_database_that_is_not_there_yet(servers):
         assert client.create(manifolds.Torus(), EPSILON).state == "WAITING"
 
 
+def test_meshes_are_copied_into_a_database_and_out_of_it(servers, undisturbed, database, tmp_path):
+    def copy(origin, target) -> str:
+        command = [stellate.server.find_stellated(), "--copy-meshes", str(origin), str(target)]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE)
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    first, last = tmp_path / "first", tmp_path / "last"
+    with stellate.Server("--data-dir", str(first)) as server, stellate.Client(server) as client:
+        finished = client.create(manifolds.Torus(), EPSILON).name
+        client.serve(manifolds.Torus(), finished)
+        waiting = client.create(manifolds.Torus(), EPSILON, worker_wait_seconds=PATIENCE).name
+    assert copy(first, tmp_path / "url").startswith("copied 2 meshes: ")
+    assert copy(first, tmp_path / "url").endswith("2 were there already\n")
+    server = servers("only")
+    wait_for(server.is_ready)
+    with stellate.Client(server.address) as client:
+        kept = stellate.download(finished, server=client)
+        assert kept.points.tobytes() == undisturbed.points.tobytes()
+        assert client.serve(manifolds.Torus(), waiting) == "SUCCEEDED"
+    assert server.end(signal.SIGTERM) == 0
+    assert copy(tmp_path / "url", last).startswith("copied 2 meshes: ")
+    with stellate.Server("--data-dir", str(last)) as server, stellate.Client(server) as client:
+        kept = stellate.download(waiting, server=client)
+        assert kept.points.tobytes() == undisturbed.points.tobytes()
+
+
 def test_refusals(tmp_path):
     def refusal(*flags: str) -> str:
         command = [stellate.server.find_stellated(), "--listen", "127.0.0.1:0", *flags]
