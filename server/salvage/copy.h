@@ -17,8 +17,9 @@ using OpenRecordsOf =
 // directory that is not there. Both must be without a server. Nothing is removed from `from`. Each
 // mesh is read back and compared; one that `to` has already stays as it is there. A copy that was
 // broken off is begun again with the same call: the mesh that it was at is copied from its start,
-// and a server that meets such a mesh before removes it. Returns what was done, in lines for people.
-// kFailedPrecondition: a record cannot be read or written; or a mesh is in both with other records.
+// and a server that meets such a mesh before removes it. Returns what was done, in lines for
+// people. kFailedPrecondition: a record cannot be read or written; or a mesh is in both with other
+// records.
 core::Expected<std::string> CopyMeshes(const std::string& from, const std::string& to,
                                        const OpenRecordsOf& open_database);
 
