@@ -253,7 +253,9 @@ void PointIntake::Note(const core::Answers& answers) {
       tangents_digest_.Add(block.tangents.data(), bytes(block.tangents));
       recorded_ += static_cast<std::uint64_t>(block.points.cols());
     }
-    asked_ = std::max(asked_, recorded_);  // a replayed round was not asked for here
+    // A replayed round was neither offered nor asked for here.
+    due_ = std::max(due_, recorded_);
+    asked_ = std::max(asked_, recorded_);
     if (answers.blocks.empty()) {
       if (state_ != State::kOver) state_ = State::kComplete;
       done = std::exchange(stream_, nullptr);

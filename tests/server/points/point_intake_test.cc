@@ -148,6 +148,28 @@ TEST(PointIntake, ANewStreamGoesOnAndRepeatsWhatItLikes) {
   session.join();
 }
 
+// A server was killed after it had recorded the end, and before its client heard of it.
+TEST(PointIntake, TheEndMayComeAgainAfterAReplay) {
+  PointIntake intake(Request(), std::chrono::seconds(60));
+  core::Answers all, end;
+  all.blocks.emplace_back().points = Part(0, kPoints).points;
+  intake.Note(all);
+  intake.Note(end);
+  EXPECT_EQ(intake.rows(), kPoints);
+  for (const std::uint64_t from : {kPoints, std::uint64_t{4}}) {
+    const auto stream = std::make_shared<Stream>();
+    ASSERT_TRUE(intake.Join(stream).ok());
+    EXPECT_EQ(stream->proceeded, 1);
+    if (from < kPoints) {
+      EXPECT_TRUE(intake.Offer(stream.get(), Part(from, kPoints - from)).ok());
+    }
+    const core::Status status = intake.OfferEnd(stream.get(), {Digest(), ""});
+    EXPECT_TRUE(status.ok()) << status.message;
+    ASSERT_EQ(stream->ends.size(), 1u);
+    EXPECT_TRUE(stream->ends[0].ok());
+  }
+}
+
 TEST(PointIntake, AWrongDigestEndsTheStreamAndNotTheMesh) {
   PointIntake intake(Request(), std::chrono::seconds(60));
   const auto wrong = std::make_shared<Stream>(), right = std::make_shared<Stream>();
