@@ -16,8 +16,8 @@ namespace {
 // A mesh is begun only if there is room for this many vertices.
 constexpr std::uint64_t kFirstVertices = 100;
 
-grpc::Status InvalidId(std::string message) {
-  return Refusal(v1::ERROR_REASON_INVALID_ARGUMENT, std::move(message), "mesh_id");
+grpc::Status InvalidId(const std::string& message) {
+  return Refusal(v1::ERROR_REASON_INVALID_ARGUMENT, message, "mesh_id");
 }
 
 // Whether one client declared both, and the same of them.

@@ -102,6 +102,7 @@ std::vector<std::uint32_t> ClearanceDips::NearestApart(const BallTree& tree,
 double ClearanceDips::DipAt(std::uint32_t n, const std::vector<std::uint32_t>& near) const {
   if (near.empty()) return 1;
   std::vector<double> most;
+  most.reserve(near.size());
   for (const std::uint32_t other : near) most.push_back(shares_[other].Most());
   const auto middle = most.begin() + static_cast<std::ptrdiff_t>(most.size() / 2);
   std::nth_element(most.begin(), middle, most.end());
