@@ -2,6 +2,7 @@ package stellate;
 
 import io.grpc.Status;
 import io.grpc.StatusRuntimeException;
+import java.io.IOException;
 import java.util.concurrent.CountDownLatch;
 import java.util.concurrent.ThreadLocalRandom;
 import java.util.concurrent.TimeUnit;
@@ -57,12 +58,15 @@ final class Outage {
 
   /**
    * Whether the server, or the way to it, was lost, so that the same call may succeed later. What a
-   * server drops arrives as CANCELLED where this side cancelled nothing.
+   * server drops arrives as CANCELLED where this side cancelled nothing, and what was about to be
+   * written as UNKNOWN, because of a closed channel. What a server says has no cause.
    */
-  private static boolean isTransient(Status status) {
+  static boolean isTransient(Status status) {
     return switch (status.getCode()) {
       case UNAVAILABLE, CANCELLED -> true;
-      case INTERNAL, UNKNOWN -> String.valueOf(status.getDescription()).contains("RST_STREAM");
+      case INTERNAL, UNKNOWN ->
+          status.getCause() instanceof IOException
+              || String.valueOf(status.getDescription()).contains("RST_STREAM");
       default -> false;
     };
   }

@@ -1,10 +1,13 @@
 package stellate;
 
 import static org.junit.jupiter.api.Assertions.assertEquals;
+import static org.junit.jupiter.api.Assertions.assertFalse;
 import static org.junit.jupiter.api.Assertions.assertSame;
 import static org.junit.jupiter.api.Assertions.assertThrows;
 import static org.junit.jupiter.api.Assertions.assertTrue;
 
+import io.grpc.Status;
+import java.nio.channels.ClosedChannelException;
 import java.nio.file.Files;
 import java.nio.file.Path;
 import java.util.List;
@@ -17,6 +20,16 @@ import stellate.StellateException.Kind;
 final class FailuresTest {
   private static StellateException thrown(Runnable work) {
     return assertThrows(StellateException.class, work::run);
+  }
+
+  @Test
+  void whatAnotherAttemptMayMend() {
+    assertTrue(Outage.isTransient(Status.UNAVAILABLE));
+    assertTrue(Outage.isTransient(Status.INTERNAL.withDescription("RST_STREAM closed stream")));
+    assertTrue(Outage.isTransient(Status.UNKNOWN.withCause(new ClosedChannelException())));
+    assertFalse(Outage.isTransient(Status.UNKNOWN.withDescription("channel closed")));
+    assertFalse(Outage.isTransient(Status.UNKNOWN.withCause(new IllegalStateException("mine"))));
+    assertFalse(Outage.isTransient(Status.INVALID_ARGUMENT));
   }
 
   @Test
