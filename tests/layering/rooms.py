@@ -187,7 +187,7 @@ PYTHON = {
     "oracle.py": ("_rows.py", "errors.py"),
     "options.py": (),
     "_wire": ("errors.py", "options.py", "oracle.py", "_wire/enums.py", "proto"),
-    "_files": ("_complex.py", "_version.py", "errors.py", "report.py"),
+    "_files": ("_complex.py", "_faces.py", "_version.py", "errors.py", "report.py"),
     "_findings.py": ("_html.py", "proto"),
     "_rank.py": ("_findings.py", "_lowest.py", "_rows.py", "_shared.py", "oracle.py"),
     "_pipe": ("errors.py",),

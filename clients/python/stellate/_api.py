@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, Union, overload
 
 from ._checkpoint import Checkpoint
 from ._credentials import Credentials
-from ._download import OnPart, Unfinished, fetch, fetch_to
+from ._download import Unfinished, fetch, fetch_to
 from ._epsilon import Epsilon
 from ._files.formats import check_save
 from ._findings import CheckReport
@@ -18,6 +18,7 @@ from ._follow import Following, OnProgress
 from ._interrupt import Interrupts, told
 from ._mesh import FinishedMesh, Mesh
 from ._notebook import calm_output
+from ._part_files import OnPart
 from ._run import Run
 from ._saved import SavedMesh
 from .client import Client
@@ -64,7 +65,7 @@ def check(
         return client.check(oracle, epsilon, seed=seed)
 
 
-@takes(MeshOptions)
+@overload
 def mesh(
     oracle: Any,
     epsilon: Epsilon,
@@ -78,7 +79,45 @@ def mesh(
     scale: Any = None,
     keep_on_server: bool = False,
     **options: Unpack[MeshOptions],
-) -> FinishedMesh:
+) -> FinishedMesh: ...
+
+
+@overload
+def mesh(
+    oracle: Any,
+    epsilon: Epsilon,
+    server: str | Server | Client | None = None,
+    on_progress: OnProgress | None = None,
+    credentials: Credentials | None = None,
+    require_certified: bool = False,
+    checkpoint: str | os.PathLike[str] | None = None,
+    save: tuple[()] = (),
+    keep: Keep | None = None,
+    scale: Any = None,
+    keep_on_server: bool = False,
+    *,
+    to: Path | Sequence[Path],
+    **options: Unpack[MeshOptions],
+) -> SavedMesh: ...
+
+
+@takes(MeshOptions)
+def mesh(
+    oracle: Any,
+    epsilon: Epsilon,
+    server: str | Server | Client | None = None,
+    on_progress: OnProgress | None = None,
+    credentials: Credentials | None = None,
+    require_certified: bool = False,
+    checkpoint: str | os.PathLike[str] | None = None,
+    save: Path | Sequence[Path] = (),
+    keep: Keep | None = None,
+    scale: Any = None,
+    keep_on_server: bool = False,
+    *,
+    to: Path | Sequence[Path] = (),
+    **options: Unpack[MeshOptions],
+) -> FinishedMesh | SavedMesh:
     """Meshes the manifold that an oracle knows.
 
     Args:
@@ -111,32 +150,39 @@ def mesh(
       keep_on_server: a finished mesh stays on `server`, as the mesh's `name`, for stellate.download and
         viewers, until somebody deletes it or the server's `keep-finished-seconds`, an hour by default,
         are over, or its `keep-finished-meshes` newer ones are there.
+      to: in place of `save`, a file or several that the finished mesh goes into as it comes from the
+        server, so that this program never holds it, however large it is; see stellate.download for
+        what is held whole still. So is a mesh with a `checkpoint`.
       **options: those below; one that is left out, or None, takes its default.
 
     Keyword Args:
       {options}
 
     Returns:
-      The mesh. It may be uncertified, when a budget was spent or epsilon is too coarse: its report
-      says so, and why; `require_certified` makes it an exception.
+      The mesh; with `to` a SavedMesh, whose `points` and `cells` are mapped from the .vtu file. It may be
+      uncertified, when a budget was spent or epsilon is too coarse: its report says so, and why;
+      `require_certified` makes it an exception.
 
     Raises:
       What the oracle raises, as itself; OracleError for answers that break a rule, and for "auto"
       where stellate.check finds an error; TypeError for an option that there is not;
       InvalidArgument, LimitExceeded, Unavailable, Cancelled, ServerNotFound, NotCertified;
-      SaveError, which has the mesh where there is one already; OSError; FailedPrecondition where
+      SaveError, which has the mesh where there is one already, or with `to` says where a server of yours
+      has it; OSError; FailedPrecondition where
       another process is meshing in the checkpoint. Ctrl-C cancels the mesh, or leaves it to the
       checkpoint, and is Interrupted, a KeyboardInterrupt with the mesh so far; a second Ctrl-C does
       not wait for that.
     """
-    files = _files(save)
+    files, streamed = _files(save), [os.fspath(file) for file in _files(to)]
+    if files and streamed:
+        raise TypeError("mesh() takes either save or to")
     if keep_on_server and server is None:
         raise InvalidArgument(
             "keep_on_server is for a server that is named: a private one ends with the call. To keep the "
             "mesh without one, save it"
         )
     checked = CheckedOracle(oracle)
-    for file in files:
+    for file in [*files, *streamed]:
         dimension = checked.dimension - bool(options.get("boundary_only"))
         check_save(file, dimension, checked.ambient_dimension)
     with contextlib.ExitStack() as stack:
@@ -165,12 +211,22 @@ def mesh(
                 every=False,
                 checkpoint=kept,
                 stays=keep_on_server,
+                to=[] if kept is not None else streamed,
             )
         )
         interrupts.on_first = session.interrupt
         (finished,) = session  # or an exception
+    if isinstance(finished, SavedMesh):
+        finished.warn_if_uncertified(stacklevel=3)
+        if require_certified and not finished.certified:
+            assert finished.report is not None
+            where = ", ".join(finished.paths)
+            raise NotCertified(
+                f"the mesh is not certified: {finished.report.what_failed}; it is in {where}"
+            )
+        return finished
     assert isinstance(finished, FinishedMesh)
-    for file in files:
+    for file in [*files, *streamed]:
         try:
             finished.save(file)
         except (OSError, SaveError) as error:
@@ -180,7 +236,7 @@ def mesh(
             f"the mesh is not certified: {finished.report.what_failed}; it is the exception's mesh",
             mesh=finished,
         )
-    return finished
+    return SavedMesh.of(finished, streamed) if streamed else finished
 
 
 @takes(MeshOptions)
@@ -224,6 +280,7 @@ def watch(
                 grown = next(meshes, None)
             if grown is None:
                 return
+            assert isinstance(grown, Mesh)
             yield grown
 
 
@@ -300,10 +357,11 @@ def download(
       path: where to write it as well, as Mesh.save does. What its format cannot hold is an error
         before anything is waited for or fetched.
       to: a file or several that the mesh goes into as it comes, so that it takes little memory however
-        large it is: the same bytes as by `path`, under that name when they are whole. Still fetched
-        whole are a mesh that did not succeed or is not over, and what a format needs whole: .stl
-        .3mf .glb .npz and what meshio writes; .msh, .vtu and .obj of manifolds with boundary; the surfaces of solids;
-        pipes.
+        large it is: the same bytes as by `path`, under that name when they are whole. A manifold with
+        boundary is first put beside a .vtu, .msh or .obj, in files without names as large as that, and the
+        simplices at its walls are in memory. Still fetched whole are a mesh that failed, was cancelled or
+        is not over, and what a format needs whole: .stl .3mf .glb .npz and what meshio writes; the
+        surfaces of solids in .off and .ply; a boundary alone in .vtu, .msh and .obj; pipes.
       server: "host:port", "unix:/path", a stellate.Server or Client.
       unfinished: what to do about a mesh that is not over: "refuse" it, "wait" for its end, however
         long that takes, or "take" it as it is now; "take" fetches what there is of a failed or

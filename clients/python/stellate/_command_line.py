@@ -144,7 +144,7 @@ def _deliver(finished: Complex | SavedMesh, options: argparse.Namespace) -> int:
 
 
 def _mesh(options: argparse.Namespace) -> int:
-    finished: Complex
+    finished: Complex | SavedMesh
     oracle, settings = oracle_of(options), _settings(options)
     if isinstance(oracle, CommandOracle):
         settings["workers"] = max(settings.get("workers", 1), oracle.processes)
@@ -154,7 +154,7 @@ def _mesh(options: argparse.Namespace) -> int:
             finished = made = mesh(
                 oracle, options.epsilon,
                 None if options.server is None else stack.enter_context(_connected(options)),
-                _bar(options), save=options.output, label=label, checkpoint=options.checkpoint,
+                _bar(options), to=options.output, label=label, checkpoint=options.checkpoint,
                 keep_on_server=options.keep, scale=options.scale, **settings,
             )  # fmt: skip
         if options.keep:
@@ -163,9 +163,9 @@ def _mesh(options: argparse.Namespace) -> int:
         if stopped.mesh is None:
             raise
         print(f"stellate: {stopped}", file=sys.stderr)
-        finished = stopped.mesh
         for path in options.output:
-            finished.save(path)
+            stopped.mesh.save(path)
+        finished = stopped.mesh
     return _deliver(finished, options)
 
 

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import contextlib
-import itertools
 import os
 from collections.abc import Sequence
-from typing import Any, Callable, Literal, get_args
+from typing import Callable, Literal, get_args
 
 import numpy as np
 
-from ._files.formats import can_stream, check_save, streamed_file
-from ._files.writing import Cells, Shape
+from ._files.formats import check_save
 from ._info import MeshInfo, unless_failed
-from ._mesh import Mesh, warn_of_uncertified, with_report
+from ._mesh import Mesh, with_report
+from ._part_files import OnPart, check_size, stream
 from ._saved import SavedMesh
 from ._wire import enums
 from ._wire.arrays import from_wire, indices_from_wire, places_from_wire
@@ -30,7 +28,6 @@ from .errors import FailedPrecondition, protocol_error
 from .report import Progress
 
 OnProgress = Callable[[Progress], None]
-OnPart = Callable[[int, int], None]
 
 Unfinished = Literal["refuse", "wait", "take"]
 UNFINISHED = get_args(Unfinished)
@@ -66,27 +63,17 @@ def fetch_to(
     """See stellate.download."""
     files = tuple(os.fspath(path) for path in paths)
     info = _settled(client, name, revision, unfinished, on_progress, files)
-    if info.state == "SUCCEEDED" and revision in (0, info.revision):
-        has_walls = client.get_spec(name).walls > 0
-        size = info.dimension, info.ambient_dimension
-        if all(can_stream(file, *size, has_walls) for file in files):
-            saved = _stream(client, info, files, on_part)
-            if saved is not None:
-                return saved
+    if info.state in ("SUCCEEDED", "STOPPED") and revision in (0, info.revision):
+        saved = stream(client, info, files, on_part)
+        if saved is not None:
+            saved.warn_if_uncertified(stacklevel=4)
+            return saved
     mesh = assemble(client, info, revision, on_part)
     if revision == 0 and unfinished != "take":
         unless_failed(mesh, info)
     for file in files:
         mesh.save(file)
-    return SavedMesh(
-        files,
-        mesh.dimension,
-        mesh.ambient_dimension,
-        len(mesh.points),
-        len(mesh.simplices),
-        mesh.revision,
-        mesh.report,
-    )
+    return SavedMesh.of(mesh, files)
 
 
 def _settled(
@@ -127,91 +114,6 @@ def _await_end(client: Client, name: str, on_progress: OnProgress | None) -> Mes
     finally:
         watch.close()
     raise protocol_error("it ended the watch too early")
-
-
-class _NotInOrder(Exception):
-    """The server does not tell a mesh's orientation, or its simplices in order: take it whole."""
-
-
-def _stream(
-    client: Client, info: MeshInfo, files: tuple[str, ...], on_part: OnPart | None
-) -> SavedMesh | None:
-    """Parts straight into files; None, and no files, where that cannot be."""
-    d, width = info.ambient_dimension, info.dimension + 1
-    vertices = simplices = 0
-    last = np.empty((0, width), dtype=np.int64)  # the simplex before
-    parts = client.parts(info.name, info.revision)
-    try:
-        with contextlib.ExitStack() as stack:
-            first = next(parts)
-            own = Cells(info.dimension, first.simplices)
-            shape = Shape(info.dimension, d, first.vertices, (own,), info.report)
-            targets = [stack.enter_context(streamed_file(file, shape)) for file in files]
-            for part in itertools.chain([first], parts):
-                try:
-                    block = from_wire(part.points, -1, d)
-                    rows = indices_from_wire(part.cells, -1, width).astype(np.int64)
-                    turned = _turned(part, rows)
-                except ValueError as error:
-                    raise protocol_error(str(error)) from error
-                if len(block) and (part.first_vertex != vertices or simplices):
-                    raise protocol_error(
-                        f"a part begins at vertex {part.first_vertex}, not at {vertices}"
-                    )
-                vertices, simplices = vertices + len(block), simplices + len(rows)
-                if len(rows):
-                    last = _next_in_order(last, rows, vertices)
-                for target in targets:
-                    if len(block):
-                        target.writer.add_points(block)
-                    if len(rows):
-                        target.writer.add_cells(0, turned if target.is_turned else rows)
-                if on_part is not None:
-                    on_part(vertices + simplices, shape.vertices + shape.simplices)
-            _check_size(shape, vertices, simplices)
-    except _NotInOrder:
-        return None
-    finally:
-        parts.close()
-    if info.report is not None and not info.report.certified:
-        for file in files:
-            warn_of_uncertified(file, info.report, stacklevel=5)
-    size = info.dimension, d, vertices, simplices
-    return SavedMesh(files, *size, part.revision, info.report)
-
-
-def _turned(part: Any, rows: np.ndarray) -> np.ndarray:
-    """The part's rows, turned to agree. Raises: ValueError, _NotInOrder."""
-    if len(rows) and not part.HasField("orientation"):
-        raise _NotInOrder
-    if not part.orientation.orientable:
-        return rows
-    bits = Orientation.from_bits(True, part.orientation.turned, len(rows))
-    on = np.flatnonzero(bits.flags(len(rows)))
-    turned = rows.copy()
-    turned[on, -2:] = rows[on][:, [-1, -2]]
-    return turned
-
-
-def _next_in_order(last: np.ndarray, rows: np.ndarray, vertices: int) -> np.ndarray:
-    """The last of the rows, which ascend, in themselves and one after the other."""
-    if not (rows[:, :-1] < rows[:, 1:]).all():
-        raise protocol_error("it sent a simplex whose ids do not ascend")
-    if int(rows[:, -1].max()) >= vertices:
-        raise protocol_error("it sent a simplex with a vertex that it never sent")
-    steps = np.diff(np.concatenate([last, rows]), axis=0)
-    first = (steps != 0).argmax(axis=1)
-    if not (steps[np.arange(len(steps)), first] > 0).all():
-        raise _NotInOrder
-    return rows[-1:]
-
-
-def _check_size(announced: Any, vertices: int, simplices: int) -> None:
-    if (vertices, simplices) != (announced.vertices, announced.simplices):
-        raise protocol_error(
-            f"{announced.vertices} vertices and {announced.simplices} simplices were announced, and "
-            f"{vertices} and {simplices} came"
-        )
 
 
 def assemble(client: Client, info: MeshInfo, revision: int, on_part: OnPart | None) -> Mesh:
@@ -258,7 +160,7 @@ def assemble(client: Client, info: MeshInfo, revision: int, on_part: OnPart | No
                 on_part(vertices + simplices, part.vertices + part.simplices)
     finally:
         parts.close()
-    _check_size(part, vertices, simplices)
+    check_size(part, vertices, simplices)
     cells = np.concatenate(rows)
     if cells.size and int(cells.max()) >= vertices:
         raise protocol_error(f"a simplex has vertex {int(cells.max())} of {vertices} vertices")

@@ -5,11 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any, Callable, TypeVar
 
+import numpy as np
+
+from ._download import assemble
 from ._info import MeshInfo, unless_failed
 from ._mesh import FinishedMesh, Mesh, with_report
 from ._wire.delta_mesh import DeltaMesh
 from .client import Client
-from .errors import protocol_error
+from .errors import StellateError, protocol_error
 from .report import Progress
 
 T = TypeVar("T")
@@ -85,6 +88,53 @@ class Following:
         look = getattr(self._on_progress, "look", None)  # a NotebookBar has
         if callable(look):
             look(self.so_far)
+
+
+class Arrival:
+    """A mesh whose end is waited for, and whose geometry stays on the server, as an iterator over the one
+    MeshInfo of that end. Closing it leaves the mesh alone.
+    """
+
+    def __init__(self, client: Client, info: MeshInfo, on_progress: OnProgress | None) -> None:
+        self._client, self._info, self._on_progress = client, info, on_progress
+        self._watch = client.watch(info.name, progress_only=True)
+
+    def __iter__(self) -> Iterator[MeshInfo]:
+        """Raises: how the mesh failed, or Cancelled, with the mesh, which is fetched."""
+        told: Progress | None = None
+        try:
+            for event in self._watch:
+                kind = event.WhichOneof("event")
+                if kind == "progress":
+                    told = Progress.from_wire(event.progress)
+                    self._note(told)
+                elif kind == "final":
+                    final = MeshInfo.from_wire(event.final)
+                    if told != final.progress:
+                        self._note(final.progress)
+                    if final.state in ("CANCELLED", "FAILED"):
+                        unless_failed(assemble(self._client, final, 0, None), final)
+                    if final.report is None:
+                        raise protocol_error("it ended the mesh without a report")
+                    yield final
+        finally:
+            self._watch.close()
+
+    def so_far(self) -> Mesh:
+        """The mesh as the server has it; an empty one if it does not answer."""
+        try:
+            return assemble(self._client, self._info, 0, None)
+        except StellateError:
+            k, d = self._info.dimension, self._info.ambient_dimension
+            return Mesh(np.empty((0, d)), np.empty((0, k + 1), dtype=np.int64))
+
+    def stop(self) -> None:
+        """From another thread: the iterator ends soon, with or without an exception."""
+        self._watch.close()
+
+    def _note(self, progress: Progress) -> None:
+        if self._on_progress is not None:
+            self._on_progress(progress)
 
 
 def _sound(step: Callable[..., T], *arguments: Any) -> T:

@@ -26,6 +26,11 @@ class Places:
         given = getattr(oracle, "coordinates", None)
         self._coordinates: Callable[[Any], Any] | None = given if callable(given) else None
 
+    @property
+    def known(self) -> bool:
+        """Whether it has."""
+        return self._coordinates is not None
+
     def in_mesh(self, mesh: Any) -> Any:
         """The mesh with its report's places in those coordinates."""
         if self._coordinates is None or mesh.report is None:

@@ -6,26 +6,33 @@ import dataclasses
 import logging
 import numbers
 import threading
-from collections.abc import Generator, Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from types import TracebackType
 from typing import Any, Callable, TypeVar
 
+import numpy as np
+
 from ._checkpoint import Checkpoint
+from ._download import assemble
 from ._epsilon import Epsilon, choose
+from ._files.formats import save
 from ._findings import CheckReport
-from ._follow import Following, OnProgress
-from ._mesh import FinishedMesh, Mesh
+from ._follow import Arrival, Following, OnProgress
+from ._mesh import FinishedMesh, Mesh, with_report
+from ._part_files import stream
 from ._places import Places
+from ._saved import SavedMesh
 from ._scale import Scale
 from ._shared import table
 from ._wire.spec import mesh_spec
 from ._worker import Ask, answer, check_max_chunk, join_all
 from .client import Client, MeshInfo
-from .errors import Interrupted, InvalidArgument, StellateError
+from .errors import Interrupted, InvalidArgument, SaveError, StellateError
 from .oracle import CheckedOracle
 from .oracles import kept as part_of
 from .oracles._kept import Keep
 from .progress import progress_bar
+from .report import Report
 from .server import Server
 
 _log = logging.getLogger("stellate")
@@ -104,7 +111,7 @@ class _Live:
 
     client: Client
     info: MeshInfo
-    following: Following
+    following: Following | Arrival
     workers: _Workers | None = None
 
 
@@ -129,11 +136,15 @@ class Run:
         checkpoint: Checkpoint | None = None,
         ask: Ask = answer,
         stays: bool = False,
+        to: Sequence[str] = (),
     ) -> None:
         """`keep`: see oracles.kept. `scale`: see oracles.in_units; what comes out is in the oracle's own
         coordinates.
 
         `stays`: a finished mesh is not deleted from its server, and says by what name it is there.
+
+        `to`: files that the finished mesh goes into as it comes; iterating gives a SavedMesh, alone. With no
+        checkpoint.
 
         `every`: iterating gives the mesh at every revision, and not only when it is finished.
 
@@ -163,6 +174,7 @@ class Run:
         if checkpoint is not None:
             choice = checkpoint.choose_epsilon
         self._on_progress, self._checkpoint, self._stays = on_progress, checkpoint, stays
+        self._to = tuple(to)
         self._epsilon_reason = ""
         self._where_it_ends: Callable[[], str] | None = getattr(oracle, "where_it_ends", None)
         try:
@@ -199,7 +211,7 @@ class Run:
 
             def begin(size: float) -> _Live:
                 info = self._declare(client, checked, size, options)
-                live = _Live(client, info, Following(client, info, on_progress, every))
+                live = _Live(client, info, self._follow(client, info, every))
                 live.workers = _Workers(
                     client, checked, info.name, int(workers), max_chunk, self._on_failure, ask
                 )
@@ -210,6 +222,11 @@ class Run:
         except BaseException:
             self._close_connection()
             raise
+
+    def _follow(self, client: Client, info: MeshInfo, every: bool) -> Following | Arrival:
+        if self._to:
+            return Arrival(client, info, self._on_progress)
+        return Following(client, info, self._on_progress, every)
 
     def _say(self, choice: tuple[float, str]) -> float:
         """Tells of an epsilon that was chosen, with a reason, and returns it."""
@@ -255,7 +272,7 @@ class Run:
             self._at_work.following.stop()
             raise error
 
-    def __iter__(self) -> Iterator[Mesh]:
+    def __iter__(self) -> Iterator[Mesh | SavedMesh]:
         """The mesh as it grows, the last with its report. Raises how it failed.
 
         Where epsilon was to be chosen and was too coarse, a finer mesh begins anew.
@@ -276,11 +293,11 @@ class Run:
             coarse = last
             self._begin_anew(self._next)
 
-    def _finer(self, mesh: Mesh) -> tuple[float, str] | None:
+    def _finer(self, report: Report | None) -> tuple[float, str] | None:
         """What is to follow a mesh that is over."""
-        if self._retries == 0 or self._interrupted or mesh.report is None:
+        if self._retries == 0 or self._interrupted or report is None:
             return None
-        finer = mesh.report.finer
+        finer = report.finer
         return None if finer is None else (finer.epsilon, finer.reason)
 
     def _begin_anew(self, choice: tuple[float, str]) -> None:
@@ -293,12 +310,20 @@ class Run:
         if self._interrupted:  # meanwhile
             self.interrupt()
 
-    def _one_mesh(self) -> Generator[Mesh, None, Mesh | None]:
-        mesh = self._next = None
+    def _one_mesh(self) -> Generator[Mesh | SavedMesh, None, Mesh | None]:
+        mesh: Mesh | None = None
+        saved: SavedMesh | None = None
+        self._next = None
         try:
-            for mesh in self._at_work.following:
-                mesh = self._told(mesh)
-                self._next = self._finer(mesh)
+            for event in self._at_work.following:
+                if isinstance(event, MeshInfo):
+                    self._next = self._finer(event.report)
+                    if self._next is None:
+                        saved = self._arrived(event)
+                        yield saved
+                    continue
+                mesh = self._told(event)
+                self._next = self._finer(mesh.report)
                 if isinstance(mesh, FinishedMesh) and self._next is None:
                     self._finish(mesh)
                 if self._every or self._next is None:
@@ -312,6 +337,8 @@ class Run:
                     self._checkpoint.forget()  # it would fail again
             if not self._interrupted:
                 raise self._best_reason(error) from None
+        if self._interrupted and saved is not None:
+            raise Interrupted(f"the mesh was finished, and is in {', '.join(saved.paths)}")
         if self._interrupted:
             raise self._interruption(mesh)
         if self._failure is not None and not self._ended:
@@ -322,6 +349,33 @@ class Run:
         self._ended = True
         if self._checkpoint is not None:
             self._checkpoint.keep(mesh)
+
+    def _arrived(self, info: MeshInfo) -> SavedMesh:
+        """Puts the finished mesh into its files. Raises: SaveError, with the mesh or where it is."""
+        client, report = self._at_work.client, info.report
+        assert report is not None
+        self._ended = True
+        # Where places in words have to be found among the points, the mesh is taken whole.
+        by_points = self._places.known or self._where_it_ends is not None
+        try:
+            if report.certified or not by_points:
+                nowhere = Mesh(np.empty((0, self._d)), np.empty((0, info.dimension + 1), np.int64))
+                told = self._told(with_report(nowhere, report))
+                final = dataclasses.replace(info, report=told.report)
+                units = None if self._scale is None else self._scale.units
+                saved = stream(client, final, self._to, units=units)
+                if saved is not None:
+                    return dataclasses.replace(saved, name=told.name)
+            mesh = self._told(assemble(client, info, 0, None))
+            for file in self._to:
+                save(mesh, file)
+            return SavedMesh.of(mesh, self._to)
+        except (OSError, SaveError) as error:
+            if self._server is None:  # it is its user's, and keeps the mesh for a while
+                self._stays = True
+                raise SaveError(f"{error}; the mesh is on its server as {info.name}") from error
+            mesh = assemble(client, info, 0, None)
+            raise SaveError(f"{error}; the mesh is the exception's", mesh=mesh) from error
 
     def _best_reason(self, error: StellateError) -> BaseException:
         """Our own exception says more than the server's account of it."""

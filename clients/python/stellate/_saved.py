@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
 from ._files import vtu
+from ._mesh import Mesh, warn_of_uncertified
 from .errors import InvalidArgument
 from .report import Report
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SavedMesh:
-    """A mesh that went into files as it came: stellate.download(name, to=path).
+    """A mesh that went into files as it came: stellate.download(name, to=path), stellate.mesh(..., to=path).
 
     Attributes:
       paths: of the files.
@@ -21,6 +23,7 @@ class SavedMesh:
       vertices, simplices: how many.
       revision: which it was.
       report: how it ended and what is proved; None while the mesh grows.
+      name: by which it is on its server still, where it was asked to stay; else "".
     """
 
     paths: tuple[str, ...]
@@ -30,6 +33,19 @@ class SavedMesh:
     simplices: int
     revision: int
     report: Report | None = dataclasses.field(default=None, repr=False)
+    name: str = ""
+
+    @classmethod
+    def of(cls, mesh: Mesh, paths: Sequence[str]) -> SavedMesh:
+        """One that was in memory, and is in these files."""
+        size = mesh.dimension, mesh.ambient_dimension, len(mesh.points), len(mesh.simplices)
+        return cls(tuple(paths), *size, mesh.revision, mesh.report, mesh.name)
+
+    def warn_if_uncertified(self, stacklevel: int) -> None:
+        """As Mesh.save does."""
+        if self.report is not None and not self.report.certified:
+            for path in self.paths:
+                warn_of_uncertified(path, self.report, stacklevel + 1)
 
     @property
     def certified(self) -> bool:

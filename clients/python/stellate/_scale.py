@@ -5,6 +5,8 @@ from __future__ import annotations
 import dataclasses
 from typing import Any, TypeVar
 
+import numpy as np
+
 from ._mesh import Mesh
 from .oracle import points_of
 from .oracles._units import in_units, units_of
@@ -18,6 +20,11 @@ class Scale:
     def __init__(self, scale: Any, d: int) -> None:
         """Raises: InvalidArgument."""
         self._units = units_of(scale, d)
+
+    @property
+    def units(self) -> np.ndarray:
+        """(d,), by which scaled points are multiplied."""
+        return self._units
 
     def oracle(self, oracle: Any) -> Any:
         """It in scaled coordinates; it knows the own ones, in which places are named."""

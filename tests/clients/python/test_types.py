@@ -26,6 +26,7 @@ with stellate.Client("there:7717") as client:
     print(client.create(stellate.manifolds.Torus(), 0.2, reach=0.4, cover_box=True).name)
     waited = stellate.download("meshes/x", "torus.vtu", server=client, unfinished="wait")
     print(waited.report.epsilon)
+print(stellate.mesh(stellate.manifolds.Torus(), 0.2, to="a.vtu", reach=0.4).cells[0])
 stellate.ImplicitManifold(
     print, "jax", ambient_dimension=3, dimension=2, bounding_box=([-1.0] * 3, [1.0] * 3)
 )
@@ -33,11 +34,13 @@ stellate.ImplicitManifold(
 
 # What is wrong, and what is said of it.
 WRONG = {
-    "stellate.mesh(torus, 0.2, max_vertexes=9)": 'Unexpected keyword argument "max_vertexes"',
-    "stellate.mesh(torus, 0.2, max_vertices='9')": 'Argument "max_vertices" .* "str"',
-    "stellate.mesh(torus, 0.2, audit='through')": "'through'.*'standard', 'thorough'",
-    "stellate.mesh(torus, 'atuo')": "'atuo'.*'auto'",
-    "stellate.mesh(torus, 0.2, keep='seed')": "'seed'.*'box', 'seeds'",
+    "stellate.mesh(torus, 0.2, max_vertexes=9)": 'No overload variant of "mesh"',
+    "stellate.mesh(torus, 0.2, to='a.vtu').simplex_tree()": '"SavedMesh" has no attribute',
+    "client.create(torus, 0.2, max_vertexes=9)": 'Unexpected keyword argument "max_vertexes"',
+    "client.create(torus, 0.2, max_vertices='9')": 'Argument "max_vertices" .* "str"',
+    "client.create(torus, 0.2, audit='through')": "'through'.*'standard', 'thorough'",
+    "stellate.watch(torus, 'atuo')": "'atuo'.*'auto'",
+    "stellate.watch(torus, 0.2, keep='seed')": "'seed'.*'box', 'seeds'",
     "stellate.watch(torus, 0.2, candidate=9)": 'Unexpected keyword argument "candidate"',
     "client.create(torus, 0.2, workers=2)": 'Unexpected keyword argument "workers"',
     "stellate.download('x', server=client, unfinished='no')": 'No overload variant of "download"',

@@ -320,7 +320,7 @@ def test_all_coordinates_are_mapped(client, oracle, epsilon, endings, tmp_path):
     client.delete(name)
 
 
-def test_walls_and_early_revisions_are_fetched_whole(finished, client, tmp_path):
+def test_walls_and_early_revisions(finished, client, tmp_path):
     name, watched = finished
     early = stellate.download(name, to=tmp_path / "early.txt", server=client, revision=2)
     assert early.report is None and early.revision == 2
@@ -413,8 +413,9 @@ def test_a_file_that_cannot_be_written(tmp_path):
 
 
 class Large(FakeServer):
-    """Two triangles for each vertex but the last ones."""
+    """Two triangles for each vertex but the last ones; the first thousand vertices are on a wall."""
 
+    walls = 0
     rows = 4000  # in a part
     vertices = 150 * rows
     simplices = 2 * (vertices - rows)
@@ -422,6 +423,7 @@ class Large(FakeServer):
     def GetMesh(self, request, context):
         mesh = mesh_pb2.Mesh(name=request.name, state=mesh_pb2.MESH_STATE_SUCCEEDED, revision=1)
         mesh.spec.dimension, mesh.spec.ambient_dimension = 2, 3
+        mesh.spec.walls = self.walls
         mesh.report.termination = mesh_pb2.TERMINATION_CONVERGED
         mesh.end_time.GetCurrentTime()
         return mesh
@@ -436,6 +438,9 @@ class Large(FakeServer):
             )  # fmt: skip
             if first < self.vertices:
                 part.points.CopyFrom(to_wire(np.full((self.rows, 3), float(first))))
+                if first == 0 and self.walls:
+                    part.boundary_vertices.extend(range(1000))
+                    part.boundary_walls.extend([1] * 1000)
             else:
                 s = np.arange(first - self.vertices, first - self.vertices + self.rows)
                 cells = np.stack([s // 2, s // 2 + 1, s // 2 + 2 + s % 2], axis=1)
@@ -445,7 +450,8 @@ class Large(FakeServer):
             yield part
 
 
-def test_a_large_download_takes_little_memory(tmp_path, repository):
+@pytest.mark.parametrize("walls", [0, 1])
+def test_a_large_download_takes_little_memory(walls, tmp_path, repository):
     """The mesh itself takes 43 MB; it took some 750 B a vertex on its way into the file, 450 MB."""
     program = """
 import resource, sys, warnings, stellate
@@ -454,7 +460,9 @@ before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 saved = stellate.download("meshes/x", to=sys.argv[2], server=sys.argv[1])
 print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, before, saved.vertices)
 """
-    with serving(Large()) as address:
+    large = Large()
+    large.walls = walls
+    with serving(large) as address:
         done = subprocess.run(
             [sys.executable, "-c", program, address, tmp_path / "a.vtu"],
             env={**os.environ, "PYTHONPATH": str(repository / "clients" / "python")},

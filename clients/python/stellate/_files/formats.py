@@ -7,7 +7,7 @@ import dataclasses
 import enum
 import importlib.util
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from typing import BinaryIO, Callable
 
 import numpy as np
@@ -15,11 +15,21 @@ import numpy as np
 from .._complex import Complex
 from ..errors import SaveError
 from . import glb, layouts, meshio_formats, npz, three_mf
-from .groups import Group, groups, label_data
+from .groups import Group, groups
 from .ply import PlyWriter
+from .spool import Spool
 from .surface import boundary, drawn
 from .vtu import VtuWriter
-from .writing import Cells, MeshWriter, Shape, TextLayout, TextWriter, is_special, replaced
+from .writing import (
+    Cells,
+    MeshWriter,
+    PointWalls,
+    Shape,
+    TextLayout,
+    TextWriter,
+    is_special,
+    replaced,
+)
 
 _ANY = 1 << 30
 _DEBIAN = {"meshio": "python3-meshio", "h5py": "python3-h5py", "netCDF4": "python3-netcdf4"}
@@ -69,20 +79,27 @@ def save_txt(mesh: Complex, path: str) -> None:
         _FORMATS[".txt"].write(mesh, draft)
 
 
-def can_stream(path: str, k: int, d: int, has_walls: bool) -> bool:
-    """Whether a mesh of these dimensions can be written to the path in the order in which it comes.
+def can_stream(path: str, k: int, d: int, has_walls: bool, is_boundary: bool = False) -> bool:
+    """Whether a mesh of these dimensions can be written to the path as it comes, held nowhere.
 
-    Not what a format groups by walls and labels, what it draws of a solid, .stl and others that are
-    written whole, what meshio writes, and pipes, which cannot be taken back.
+    Not what a format draws of a solid, .stl and others that are written whole, what meshio writes, a
+    boundary alone where it is grouped by walls, and pipes, which cannot be taken back.
     """
     form = _choose(path, k, d)
     if not form.streams or is_special(path):
         return False
     if form.holds is Holds.ROWS:
         return True
-    if k == 3 and form.holds is not Holds.GROUPS:
-        return False  # it is drawn
-    return form.holds is Holds.DRAWN or not has_walls
+    if form.holds is Holds.DRAWN:
+        return k < 3  # else it is drawn
+    if has_walls:
+        return not is_boundary
+    return k < 3 or form.holds is Holds.GROUPS
+
+
+def needs_groups(path: str, k: int, d: int, has_walls: bool) -> bool:
+    """Of a path that can_stream: whether save_spooled writes it, and no streamed_file."""
+    return has_walls and _choose(path, k, d).holds in (Holds.POLYGONS, Holds.GROUPS)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -101,6 +118,40 @@ def streamed_file(path: str, shape: Shape) -> Iterator[StreamedFile]:
         writer = form.writer(file, shape)
         yield StreamedFile(writer, form.holds is not Holds.ROWS)
         writer.finish()
+
+
+def save_spooled(path: str, spool: Spool, shape: Shape) -> bool:
+    """Writes what a spool has to a path that needs_groups; `shape`: without groups. False, and no file:
+    the mesh has to be written whole."""
+    k = shape.dimension
+    form = _choose(path, k, shape.ambient_dimension)
+    every = form.grouped(spool.groups(), k)
+    if every is None:
+        return False
+
+    def cells(of: list[Group]) -> Iterator[tuple[int, np.ndarray]]:
+        for number, group in enumerate(of):
+            if group.dimension < k:
+                yield number, group.simplices
+            else:
+                yield from ((number, rows) for rows in spool.cells(group.label))
+
+    counts = [spool.count(it.label) if it.dimension == k else len(it.simplices) for it in every]
+    shape = dataclasses.replace(
+        shape,
+        groups=tuple(map(_cells_of, every, counts)),
+        walls=spool.walls,
+        has_labels=spool.has_labels,
+    )
+    with replaced(path) as draft, open(draft, "wb") as file:
+        form.fill(file, shape, spool.points(), cells(every))
+    return True
+
+
+def _cells_of(group: Group, count: int) -> Cells:
+    return Cells(
+        group.dimension, count, group.tag, group.name, group.bits, group.label, group.sides
+    )
 
 
 class Holds(enum.Enum):
@@ -140,15 +191,27 @@ class _Format:
         """Whether points and cells of one group are written in the order in which they come."""
         return self.is_vtu or self.is_ply or self.layout is not None
 
-    def writer(self, file: BinaryIO, shape: Shape, mesh: Complex | None = None) -> MeshWriter:
-        """`mesh`: of a file that has more than points and simplices, which they then are whole."""
+    def writer(self, file: BinaryIO, shape: Shape) -> MeshWriter:
         if self.layout is not None:
             return TextWriter(file, self.layout(shape))
         if self.is_ply:
             return PlyWriter(file, shape)
-        if mesh is None:
-            return VtuWriter(file, shape)
-        return VtuWriter(file, shape, mesh.walls, _cell_data(mesh))
+        return VtuWriter(file, shape)
+
+    def fill(
+        self,
+        file: BinaryIO,
+        shape: Shape,
+        points: Iterable[np.ndarray],
+        cells: Iterable[tuple[int, np.ndarray]],
+    ) -> None:
+        """`cells`: with the number of their group, from zero."""
+        writer = self.writer(file, shape)
+        for block in points:
+            writer.add_points(block)
+        for number, rows in cells:
+            writer.add_cells(number, rows)
+        writer.finish()
 
     def write(self, mesh: Complex, path: str) -> None:
         if self.contents is not None:
@@ -161,15 +224,13 @@ class _Format:
             mesh.dimension,
             mesh.ambient_dimension,
             len(points),
-            tuple(Cells(it.dimension, len(it.simplices), it.tag, it.name) for it in every),
+            tuple(_cells_of(it, len(it.simplices)) for it in every),
             mesh.report,
+            None if mesh.walls is None else PointWalls.of(mesh.walls),
+            mesh.labels is not None,
         )
         with open(path, "wb") as file:
-            writer = self.writer(file, shape, mesh)
-            writer.add_points(points)
-            for number, group in enumerate(every):
-                writer.add_cells(number, group.simplices)
-            writer.finish()
+            self.fill(file, shape, [points], ((i, it.simplices) for i, it in enumerate(every)))
 
     def _contents(self, mesh: Complex) -> tuple[np.ndarray, list[Group]]:
         """The points and the cells that it holds."""
@@ -181,30 +242,19 @@ class _Format:
             if mesh.dimension == 3:
                 points, rows = drawn(mesh, rows)
             return points, [Group(1, "", (), rows)]
-        every = groups(mesh, rows)
+        every = self.grouped(groups(mesh, rows), mesh.dimension)
+        if every is None:
+            every = [Group(1, "", (), boundary(rows))]
+        return mesh.points, every
+
+    def grouped(self, every: list[Group], k: int) -> list[Group] | None:
+        """Those of all groups that it holds; None where it is not known on what walls a solid ends, of
+        which it holds the boundary alone."""
         if self.holds is Holds.GROUPS:
-            return mesh.points, every
-        if len(every) == 1:  # it is not known on what walls a solid ends
-            rows = boundary(rows) if mesh.dimension == 3 else rows
-            return mesh.points, [Group(1, "", (), rows)]
-        return mesh.points, [group for group in every if group.dimension < 3]
-
-
-def _cell_data(mesh: Complex) -> dict[str, np.ndarray]:
-    """Of a mesh of several groups or with labels, what its cells have in .vtu."""
-    every = groups(mesh, cells(mesh))
-    if len(every) == 1 and mesh.labels is None:
-        return {}
-    counts = [len(group.simplices) for group in every]
-    bits = np.array([group.bits for group in every], dtype=np.uint64)
-    tags = np.array([group.tag for group in every], dtype=np.int32)
-    data: dict[str, np.ndarray] = {
-        "walls": np.repeat(bits, counts),
-        "group": np.repeat(tags, counts),
-    }
-    if mesh.labels is not None:
-        data.update({name: np.concatenate(it) for name, it in label_data(every).items()})
-    return data
+            return every
+        if len(every) == 1:
+            return None if k == 3 else [dataclasses.replace(every[0], name="")]
+        return [group for group in every if group.dimension < 3]
 
 
 def _choose(path: str, k: int, d: int) -> _Format:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 
 import numpy as np
 
 from .._complex import Complex
+from .._faces import faces
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -48,25 +50,42 @@ def groups(mesh: Complex, cells: np.ndarray) -> list[Group]:
     labels = mesh.labels
     if labels is not None and labels.ndim == 2:
         return _boundary_groups(mesh, cells, labels)
+    known = () if labels is None else np.unique(labels).tolist()
+    return cell_groups(mesh.simplices, cells, mesh.walls, labels, mesh.region_names, known)
+
+
+def cell_groups(
+    simplices: np.ndarray,
+    cells: np.ndarray,
+    walls: np.ndarray | None,
+    labels: np.ndarray | None,
+    names: tuple[str, ...],
+    known: Sequence[int],
+) -> list[Group]:
+    """Those of a mesh that is not a boundary alone; `known`, ascending: the labels, where it has some.
+
+    Its simplices, and the same as `cells`, may be those alone that have a vertex on a wall: then so
+    are those of the regions, and the faces are those of the whole mesh.
+    """
+    k = simplices.shape[1] - 1
     found = [Group(1, "inside", (), cells)]
-    if labels is not None and len(labels):
-        several = np.unique(labels).tolist()
-        is_all = len(several) == 1 and not mesh.region_names
+    if labels is not None and len(known):
+        is_all = len(known) == 1 and not names
         found = [
             Group(
                 number,
-                "inside" if is_all else region_name(label, mesh.region_names),
+                "inside" if is_all else region_name(label, names),
                 (),
                 cells[labels == label],
                 label,
             )
-            for number, label in enumerate(several, 1)
+            for number, label in enumerate(known, 1)
         ]
     regions = list(found)
-    for dimension in reversed(range(mesh.dimension)):
-        for face in mesh.faces(dimension):
+    for dimension in reversed(range(k)):
+        for face in faces(simplices, walls, dimension, labels):
             rows, sides = face.simplices, None
-            if dimension == mesh.dimension - 1 >= 1:
+            if dimension == k - 1 >= 1:
                 sides = None if labels is None else np.zeros((len(rows), 2), dtype=np.int32)
                 for region in reversed(regions):  # of several, the first one's turn stays
                     rows, on = _turned(rows, region.simplices)
@@ -128,7 +147,7 @@ def _turned(rows: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray
     """The facets as the cells that have them induce their orientation, others as they are; and which
     the cells have."""
     wanted = {tuple(row): i for i, row in enumerate(np.sort(rows, axis=1).tolist())}
-    on = np.zeros(int(max(cells.max(), rows.max())) + 1, dtype=bool)
+    on = np.zeros(int(max(cells.max(initial=0), rows.max())) + 1, dtype=bool)
     on[rows] = True
     turned, there = rows.copy(), np.zeros(len(rows), dtype=bool)
     for out in range(cells.shape[1]):

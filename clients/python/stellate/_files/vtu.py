@@ -5,14 +5,14 @@ from __future__ import annotations
 import base64
 import dataclasses
 import re
-from collections.abc import Mapping
-from typing import BinaryIO
+from collections.abc import Iterator
+from typing import BinaryIO, Callable
 
 import numpy as np
 
 from .._complex import in_space
 from .._version import __version__
-from .writing import Shape
+from .writing import Cells, Shape
 
 _TYPES = {
     "<f8": "Float64",
@@ -54,32 +54,24 @@ class VtuWriter:
     """A MeshWriter. Wider numbers come first in the file: each number begins at a multiple of its size,
     so that a file can be mapped into memory."""
 
-    def __init__(
-        self,
-        file: BinaryIO,
-        shape: Shape,
-        walls: np.ndarray | None = None,
-        cell_data: Mapping[str, np.ndarray] | None = None,
-    ) -> None:
-        """walls, cell_data: of a mesh that has some, whole; "walls", "group", "region", "sides"."""
+    def __init__(self, file: BinaryIO, shape: Shape) -> None:
         self._file, self._shape = file, shape
-        self._walls, self._cell_data = walls, cell_data or {}
         n, m, d = shape.vertices, shape.simplices, shape.ambient_dimension
         ids = sum(group.count * (group.dimension + 1) for group in shape.groups)
         every = {"points": _Array("<f8", "Points", 3, n, "Points")}
         if d > 3:
             every["coordinates"] = _Array("<f8", "coordinates", d, n, "PointData")
-        if walls is not None:
+        if shape.walls is not None:
             every["point walls"] = _Array("<u8", "walls", 1, n, "PointData")
         every["connectivity"] = _Array("<i8", "connectivity", 1, ids, "Cells")
         every["offsets"] = _Array("<i8", "offsets", 1, m, "Cells")
-        for name, kind, components in (
-            ("walls", "<u8", 1),
-            ("group", "<i4", 1),
-            ("region", "<i4", 1),
-            ("sides", "<i4", 2),
+        for name, kind, components, is_there in (
+            ("walls", "<u8", 1, len(shape.groups) > 1 or shape.has_labels),
+            ("group", "<i4", 1, len(shape.groups) > 1 or shape.has_labels),
+            ("region", "<i4", 1, shape.has_labels),
+            ("sides", "<i4", 2, shape.has_labels),
         ):
-            if name in self._cell_data:
+            if is_there:
                 every[name] = _Array(kind, name, components, m, "CellData")
         every["types"] = _Array("|u1", "types", 1, m, "Cells")
         place = 0
@@ -132,9 +124,12 @@ class VtuWriter:
             self._append("coordinates", points)
 
     def _add_walls(self) -> None:
-        if self._walls is not None:
-            self._append("point walls", self._walls)
-            self._walls = None
+        walls, n = self._shape.walls, self._shape.vertices
+        if walls is None or self._arrays["point walls"].written >= 0:
+            return
+        self._append("point walls", np.empty(0))
+        for first in range(0, n, _ROWS):
+            self._append("point walls", walls.rows(first, min(n, first + _ROWS)))
 
     def add_cells(self, group: int, cells: np.ndarray) -> None:
         self._add_walls()
@@ -150,22 +145,39 @@ class VtuWriter:
         self._append("connectivity", nothing)
         last = 0
         self._append("offsets", nothing)
-        for group in self._shape.groups:
-            for first in range(0, group.count, _ROWS):
-                count = min(_ROWS, group.count - first)
-                ends = last + (group.dimension + 1) * np.arange(1, count + 1)
-                self._append("offsets", ends)
-                last = int(ends[-1])
-        for name in ("walls", "group", "region", "sides"):
-            if name in self._arrays:
-                self._append(name, self._cell_data[name])
-        self._append("types", nothing)
-        for group in self._shape.groups:
-            for first in range(0, group.count, _ROWS):
-                count = min(_ROWS, group.count - first)
-                self._append("types", np.full(count, CELL_TYPES[group.dimension], dtype=np.uint8))
+        for group, _, count in self._blocks():
+            ends = last + (group.dimension + 1) * np.arange(1, count + 1)
+            self._append("offsets", ends)
+            last = int(ends[-1])
+        self._fill("walls", lambda group: np.uint64(group.bits))
+        self._fill("group", lambda group: group.tag)
+        self._fill("region", lambda group: group.label)
+        if "sides" in self._arrays:
+            self._append("sides", nothing)
+            for group, first, count in self._blocks():
+                sides = group.sides
+                self._append(
+                    "sides",
+                    np.zeros((count, 2)) if sides is None else sides[first : first + count],
+                )
+        self._fill("types", lambda group: CELL_TYPES[group.dimension])
         types = self._arrays["types"]
         self._put(self._data + types.place + 8 + types.size, b"\n</AppendedData>\n</VTKFile>\n")
+
+    def _blocks(self) -> Iterator[tuple[Cells, int, int]]:
+        """The cells, some at a time: their group, the first one's number in it, how many they are."""
+        for group in self._shape.groups:
+            for first in range(0, group.count, _ROWS):
+                yield group, first, min(_ROWS, group.count - first)
+
+    def _fill(self, name: str, of: Callable[[Cells], int | np.uint64]) -> None:
+        """An array with one number for all cells of a group."""
+        if name not in self._arrays:
+            return
+        kind = self._arrays[name].kind
+        self._append(name, np.empty(0))
+        for group, _, count in self._blocks():
+            self._append(name, np.full(count, of(group), dtype=kind))
 
 
 def _field_data(shape: Shape) -> dict[str, np.ndarray]:

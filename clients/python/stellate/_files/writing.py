@@ -20,18 +20,47 @@ _ROWS = 1 << 14  # that are text at a time
 _FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)  # what a write raises, without a name
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Cells:
-    """A group of cells of a file: their dimension and number, and of one of several groups its number
-    and name."""
+    """A group of cells of a file: their dimension and number, and of one of several groups what Group
+    says of it."""
 
     dimension: int
     count: int
     tag: int = 1
     name: str = ""
+    bits: int = 0
+    label: int = 0
+    sides: np.ndarray | None = None
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
+class PointWalls:
+    """The walls of points, wall i as bit i.
+
+    Attributes:
+      on: the ids of those that are on some, ascending.
+      bits: (len(on),) uint64.
+    """
+
+    on: np.ndarray
+    bits: np.ndarray
+
+    @classmethod
+    def of(cls, walls: np.ndarray) -> PointWalls:
+        """walls: (n,) uint64."""
+        on = np.flatnonzero(walls)
+        return cls(on, walls[on])
+
+    def rows(self, first: int, last: int) -> np.ndarray:
+        """(last - first,) uint64: those of the points from `first` to before `last`."""
+        some = slice(*np.searchsorted(self.on, (first, last)))
+        walls = np.zeros(last - first, dtype=np.uint64)
+        walls[self.on[some] - first] = self.bits[some]
+        return walls
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
 class Shape:
     """What a file is to hold, before any of it is there."""
 
@@ -40,6 +69,8 @@ class Shape:
     vertices: int
     groups: tuple[Cells, ...]
     report: Report | None = None
+    walls: PointWalls | None = None
+    has_labels: bool = False
 
     @property
     def simplices(self) -> int:
