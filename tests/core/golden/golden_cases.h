@@ -3,10 +3,16 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <ostream>
+#include <stdexcept>
 #include <string>
+#include <string_view>
+#include <utility>
 #include <vector>
 
+#include "tests/core/support/arrangements.h"
+#include "tests/core/support/domains.h"
 #include "tests/core/support/in_process_run.h"
 
 namespace stellate::core::testing {
@@ -14,15 +20,25 @@ namespace stellate::core::testing {
 // A run that is recorded: a specification, whatever answers it, and what happens on the way. Its
 // file says in words what it shows.
 struct GoldenCase {
-  const char* name;  // of its file
-  std::string manifold;
+  const char* name;      // of its file
+  std::string manifold;  // of the built-in ones; empty: `walled`
   double epsilon = 0;
   std::function<void(Specification&)> change = [](Specification&) {};
   // What is done to the answers to a round, before they are given.
   std::function<void(const Specification&, const QueryBatch&, Answers&)> spoil = {};
   bool answered_by_library = false;  // by the C library's functions, which round as they like
   std::uint64_t cancel_before = 0, fail_before = 0, interrupt_before = 0;  // rounds; 0: never
+  std::shared_ptr<const stellate::testing::Arrangement> walled = nullptr;
 };
+
+// M with walls, and with labels if it has a function of them.
+inline GoldenCase Walled(
+    const char* name, stellate::testing::Arrangement walled, double epsilon,
+    std::function<void(Specification&)> change = [](Specification&) {}, bool by_library = false) {
+  GoldenCase c{name, "", epsilon, std::move(change), {}, by_library};
+  c.walled = std::make_shared<const stellate::testing::Arrangement>(std::move(walled));
+  return c;
+}
 
 // In place of its bytes, in the tests' names.
 inline void PrintTo(const GoldenCase& c, std::ostream* out) { *out << c.name; }
@@ -89,6 +105,39 @@ inline void Jitter(const Specification& spec, const QueryBatch& batch, Answers& 
       const double wave = std::sin(60 * x.sum() / spec.epsilon);
       answers.blocks[b].points.col(i) += 0.2 * spec.epsilon * wave * x.normalized();
     }
+}
+
+inline stellate::testing::Arrangement Unlabelled(stellate::testing::Domain domain) {
+  stellate::testing::Arrangement a;
+  a.domain = std::move(domain);
+  return a;
+}
+
+inline stellate::testing::Arrangement OfSpace(std::string_view name) {
+  for (auto& a : stellate::testing::SpaceArrangements())
+    if (a.name == name) return a;
+  throw std::invalid_argument("no arrangement of space is named " + std::string(name));
+}
+
+// Boundaries, creases, materials.
+inline std::vector<GoldenCase> WalledCases() {
+  using S = Specification;
+  namespace t = stellate::testing;
+  return {
+      Walled("walls_arc", Unlabelled(t::Arc()), 0.2),
+      Walled("walls_octant", Unlabelled(t::Octant()), 0.3),
+      Walled("walls_annulus", Unlabelled(t::Annulus()), 0.15),
+      Walled("walls_hemisphere_speculative", Unlabelled(t::Hemisphere()), 0.3,
+             [](S& s) { s.criteria.speculative = true; }),
+      Walled("walls_vertex_budget", Unlabelled(t::Annulus()), 0.1,
+             [](S& s) { s.limits.max_vertices = 60; }),
+      Walled("labels_two_coloured_torus", t::PlaneArrangements().back(), 0.3),
+      Walled(
+          "labels_three_phases", t::PhaseArrangements().front(), 0.15, [](S&) {}, true),
+      Walled("labels_cube_plus_ball", OfSpace("CubePlusBall"), 0.5),
+      Walled("labels_lens_in_ball", OfSpace("LensInBall"), 0.35),
+      Walled("boundary_of_union", OfSpace("Union"), 0.4, [](S& s) { s.boundary_only = true; }),
+  };
 }
 
 inline std::vector<GoldenCase> Cases() {

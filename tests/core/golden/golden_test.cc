@@ -5,11 +5,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <bit>
 #include <cinttypes>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
 #include <fstream>
+#include <map>
+#include <memory>
 #include <sstream>
 #include <string>
 #include <string_view>
@@ -133,6 +136,10 @@ constexpr const char* kLegend =
   the first three new points
   digests of queries, new points, their tangents, delta, progress
 )";
+constexpr const char* kLegendOfWalls =
+    R"(  number of walls: new vertices on so many; digests of the faces asked for, of those vertices' walls
+  and of all labels
+)";
 
 void WriteEnd(const Report& report, std::ostream& out) {
   const Counts& n = report.counts;
@@ -151,16 +158,47 @@ void WriteEnd(const Report& report, std::ostream& out) {
   for (const std::string& warning : c.warnings) out << "warning: " << warning << '\n';
 }
 
+// How many of the new vertices are on each number of walls, and digests of which faces were asked
+// for, of the new vertices' walls and of all labels.
+void WriteWalls(const Mesher& mesher, const QueryBatch& batch, const MeshDelta& delta,
+                std::ostream& out) {
+  Digest faces;
+  for (const QueryBlock& block : batch.blocks) faces.Add(block.face).Add(block.want.clearances);
+  std::map<int, std::size_t> on_walls;
+  for (const WallSet walls : delta.walls) ++on_walls[std::popcount(walls)];
+  out << "  on walls";
+  for (const auto& [count, vertices] : on_walls) out << ' ' << count << ": " << vertices << ';';
+  out << ' ' << faces.Hex() << ' ' << Digest().Add(delta.walls).Hex() << ' '
+      << Digest().Add(mesher.Labels()).Hex() << '\n';
+}
+
+// What is meshed, and who answers.
+struct Subject {
+  Specification spec;
+  Answerer answer;
+};
+
+Subject SubjectOf(const GoldenCase& c) {
+  if (c.walled) {
+    const auto& walled = *c.walled;
+    const auto domain = std::make_shared<stellate::testing::Domain>(walled.domain);
+    return {walled.label ? walled.SpecificationFor(c.epsilon)
+                         : walled.domain.SpecificationFor(c.epsilon),
+            [domain](const QueryBatch& batch) { return domain->AnswersOf(batch); }};
+  }
+  const std::shared_ptr<Oracle> manifold = testing::Make(c.manifold);
+  return {testing::SpecificationFor(*manifold, c.epsilon),
+          [manifold](const QueryBatch& batch) { return testing::AnswersOf(*manifold, batch); }};
+}
+
 // What a run does, round by round, and how it ends.
 std::string Record(const GoldenCase& c, int threads) {
-  const auto manifold = testing::Make(c.manifold);
-  Specification spec = testing::SpecificationFor(*manifold, c.epsilon);
+  auto [spec, answer] = SubjectOf(c);
   c.change(spec);
   spec.threads = threads;
   const auto mesher = testing::NewMesher(spec);
-  const Answerer answer = AnswererFor(*manifold);
   std::ostringstream out;
-  out << kLegend;
+  out << kLegend << (spec.walls > 0 ? kLegendOfWalls : "");
   std::string phase;
   while (const auto batch = mesher->NextBatch()) {
     if (std::exchange(phase, PhaseName(mesher->progress().phase)) != phase)
@@ -208,6 +246,7 @@ std::string Record(const GoldenCase& c, int threads) {
                .Add(delta->removed)
                .Hex()
         << ' ' << DigestOf(progress).Hex() << '\n';
+    if (spec.walls > 0) WriteWalls(*mesher, *batch, *delta, out);
   }
   out << "whole mesh, digests of points, tangents, simplices, progress\n  "
       << Digest().Add(Eigen::MatrixXd(mesher->Points())).Hex() << ' '
@@ -313,8 +352,12 @@ TEST_P(GoldenFiles, TellWhatTheMesherDoes) {
   EXPECT_EQ(Record(c, 4), one) << "4 threads";
 }
 
+std::string NameOf(const ::testing::TestParamInfo<GoldenCase>& tested) { return tested.param.name; }
+
 INSTANTIATE_TEST_SUITE_P(Recorded, GoldenFiles, ::testing::ValuesIn(testing::golden::Cases()),
-                         [](const auto& tested) { return tested.param.name; });
+                         NameOf);
+INSTANTIATE_TEST_SUITE_P(RecordedWalls, GoldenFiles,
+                         ::testing::ValuesIn(testing::golden::WalledCases()), NameOf);
 
 }  // namespace
 }  // namespace stellate::core
