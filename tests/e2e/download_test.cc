@@ -24,6 +24,7 @@
 
 #include "live.h"
 #include "run/worker.h"
+#include "stellate/oracles/walls.h"
 #include "stellate/v1/stellate.grpc.pb.h"
 #include "support/spoiled_oracle.h"
 #include "wire/convert.h"
@@ -200,10 +201,44 @@ TEST_F(DownloadTest, TheCommandLineWritesTheSameFile) {
   fs::remove_all(directory);
 }
 
+std::string SavedAs(const std::string& path, const Mesh& mesh) {
+  EXPECT_TRUE(mesh.Save(path).has_value()) << path;
+  return ReadFile(path);
+}
+
+// Walls group the files, whose bytes are those of the mesh that is held whole.
+TEST_F(DownloadTest, MeshesWithWallsGoIntoFilesAsTheyCome) {
+  const fs::path directory =
+      fs::temp_directory_path() / ("stellate-walls-" + std::to_string(getpid()));
+  fs::create_directories(directory);
+  for (const auto& [shape, epsilon] : {std::pair{"half-torus", 0.3}, std::pair{"cylinder", 0.4}}) {
+    const auto domain = oracles::MakeDomain(shape).value();
+    const std::string name = Create(*domain, epsilon);
+    Serve(*domain, name);
+    const Expected<Mesh> whole = DownloadMesh(name, options_);
+    ASSERT_TRUE(whole.has_value()) << whole.error().message;
+    EXPECT_FALSE(whole->boundary().empty());
+    std::vector<std::string> paths;
+    for (const std::string ending : {"vtu", "msh", "obj", "txt"})
+      paths.push_back(directory / ("parts." + ending));
+    const Expected<SavedMesh> saved = DownloadMeshTo(name, paths, options_);
+    ASSERT_TRUE(saved.has_value()) << saved.error().message;
+    EXPECT_EQ(saved->simplices, static_cast<std::uint64_t>(whole->simplices.cols()));
+    for (const std::string& path : paths)
+      EXPECT_EQ(ReadFile(path),
+                SavedAs(directory / ("w" + fs::path(path).filename().string()), *whole))
+          << path;
+    EXPECT_EQ(std::distance(fs::directory_iterator(directory), {}), 8) << "and no other file";
+    Delete(name);
+  }
+  fs::remove_all(directory);
+}
+
 // A hexagon in the plane, sent a row at a time.
 class Scattered final : public v1::Stellate::Service {
  public:
   bool in_order = false;   // and oriented
+  bool has_wall = false;   // with the first vertex on it
   std::deque<int> breaks;  // after so many parts each stream in turn is broken off
   grpc::Status with{grpc::StatusCode::UNAVAILABLE, "broken by the test"};
   std::vector<std::pair<std::uint64_t, std::uint64_t>> asked;  // revision, position
@@ -216,6 +251,7 @@ class Scattered final : public v1::Stellate::Service {
     mesh->set_revision(7);
     mesh->mutable_spec()->set_dimension(1);
     mesh->mutable_spec()->set_ambient_dimension(2);
+    mesh->mutable_spec()->set_walls(has_wall ? 1 : 0);
     mesh->mutable_report()->set_termination(v1::TERMINATION_CONVERGED);
     mesh->mutable_end_time()->set_seconds(1);
     return grpc::Status::OK;
@@ -249,6 +285,10 @@ class Scattered final : public v1::Stellate::Service {
       part.mutable_points()->add_shape(1);
       part.mutable_points()->add_shape(2);
       part.mutable_points()->set_data(point, sizeof point);
+      if (has_wall && position == 0) {
+        part.add_boundary_vertices(0);
+        part.add_boundary_walls(1);
+      }
     } else {
       const auto i = static_cast<std::uint32_t>(11 - position);  // not in order
       const std::uint32_t sorted[][2] = {{0, 1}, {0, 5}, {1, 2}, {2, 3}, {3, 4}, {4, 5}};
@@ -452,6 +492,49 @@ TEST_F(FilesOfADownload, AreNotThereByHalves) {
   expect_old(ErrorCode::kStopped);
 }
 
+TEST_F(FilesOfADownload, WithoutRoomForTheirGroupsLeaveTheOthers) {
+  fake_.has_wall = true;
+  const auto whole = [this] { return FetchTo({"a.vtu", "b.txt"}); };
+  EXPECT_TRUE(whole().value().failures.empty());
+  EXPECT_NE(ReadFile(Path("a.vtu")).find("wall"), std::string::npos);
+  fs::remove(Path("a.vtu"));
+  rlimit before{};
+  getrlimit(RLIMIT_FSIZE, &before);
+  rlimit limit = before;
+  limit.rlim_cur = 90;  // bytes that a file may grow to; the points have 96
+  const auto ignored = signal(SIGXFSZ, SIG_IGN);
+  setrlimit(RLIMIT_FSIZE, &limit);
+  const Expected<SavedMesh> saved = whole(), none = FetchTo({"c.vtu"});
+  setrlimit(RLIMIT_FSIZE, &before);
+  signal(SIGXFSZ, ignored);
+  ASSERT_TRUE(saved.has_value()) << saved.error().message;
+  ASSERT_EQ(saved->failures.size(), 1u);
+  EXPECT_NE(saved->failures[0].message.find("a.vtu: "), std::string::npos);
+  ASSERT_FALSE(none.has_value());
+  EXPECT_EQ(none.error().code, ErrorCode::kFileFailed);
+  EXPECT_EQ(Left(), std::vector<std::string>{"b.txt"});
+}
+
+TEST_F(FilesOfADownload, OfWallsThatAreNotBesideTheirVerticesAreTheServersFault) {
+  fake_.has_wall = true;
+  const std::vector<std::function<void(v1::DownloadMeshResponse*)>> faults = {
+      [](auto* part) { part->add_boundary_vertices(0); },
+      [](auto* part) {
+        part->add_boundary_vertices(part->first_vertex() == 0 ? 3 : 0);
+        part->add_boundary_walls(1);
+      },
+      [](auto* part) {
+        if (part->complete()) part->set_cell_labels("\1");
+      }};
+  for (const auto& fault : faults) {
+    fake_.spoil = fault;
+    const Expected<SavedMesh> saved = FetchTo({"a.vtu"});
+    ASSERT_FALSE(saved.has_value());
+    EXPECT_EQ(saved.error().code, ErrorCode::kServerFailed) << saved.error().message;
+  }
+  EXPECT_TRUE(Left().empty());
+}
+
 TEST_F(FilesOfADownload, ThatCannotBeWrittenLeaveTheOthers) {
   EXPECT_EQ(FetchTo({"missing/a.txt", "b.txt"}).error().code, ErrorCode::kFileFailed);
   EXPECT_TRUE(fake_.asked.empty()) << "before anything is fetched";
@@ -472,9 +555,10 @@ TEST_F(FilesOfADownload, ThatCannotBeWrittenLeaveTheOthers) {
   EXPECT_EQ(Left(), std::vector<std::string>{"b.txt"});
 }
 
-// Two triangles for each vertex but the last ones.
+// Two triangles for each vertex but the last ones; the first thousand vertices are on a wall.
 class Large final : public v1::Stellate::Service {
  public:
+  bool has_wall = false;
   static constexpr std::uint64_t kRows = 4000;  // in a part
   static constexpr std::uint64_t kVertices = 150 * kRows, kSimplices = 2 * (kVertices - kRows);
 
@@ -485,6 +569,7 @@ class Large final : public v1::Stellate::Service {
     mesh->set_revision(1);
     mesh->mutable_spec()->set_dimension(2);
     mesh->mutable_spec()->set_ambient_dimension(3);
+    mesh->mutable_spec()->set_walls(has_wall ? 1 : 0);
     mesh->mutable_end_time()->set_seconds(1);
     return grpc::Status::OK;
   }
@@ -502,6 +587,10 @@ class Large final : public v1::Stellate::Service {
         part.mutable_points()->add_shape(kRows);
         part.mutable_points()->add_shape(3);
         part.mutable_points()->set_data(points.data(), points.size() * sizeof(double));
+        for (std::uint32_t i = 0; first == 0 && has_wall && i < 1000; ++i) {
+          part.add_boundary_vertices(i);
+          part.add_boundary_walls(1);
+        }
       } else {
         std::vector<std::uint32_t> cells;
         for (std::uint64_t s = first - kVertices; s < first - kVertices + kRows; ++s) {
@@ -548,9 +637,12 @@ TEST(LargeDownload, TakesLittleMemory) {
   const std::unique_ptr<grpc::Server> server = builder.BuildAndStart();
   const fs::path path =
       fs::temp_directory_path() / ("stellate-large-" + std::to_string(getpid()) + ".vtu");
-  EXPECT_LT(PeakOf("meshes/x", "127.0.0.1:" + std::to_string(port), path), 100u << 20);
-  EXPECT_GT(fs::file_size(path), 48 * Large::kVertices);
-  fs::remove(path);
+  for (const bool has_wall : {false, true}) {
+    large.has_wall = has_wall;
+    EXPECT_LT(PeakOf("meshes/x", "127.0.0.1:" + std::to_string(port), path), 100u << 20);
+    EXPECT_GT(fs::file_size(path), 48 * Large::kVertices);
+    fs::remove(path);
+  }
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -12,6 +13,12 @@
 #include "stellate/mesh.h"
 
 namespace stellate::client {
+
+// The walls of points, as bits: the ids, ascending, of those that are on some.
+struct PointWalls {
+  std::vector<std::uint32_t> on;
+  std::vector<std::uint64_t> bits;  // of each of them
+};
 
 // What a file is to hold, before any of it is there.
 struct FileShape {
@@ -25,6 +32,8 @@ struct FileShape {
   std::uint64_t vertices = 0;
   std::vector<Cells> groups = {};
   Report report = {};  // of a mesh that is over
+  std::optional<PointWalls> walls = {};
+  bool has_labels = false;  // its cells; also those of a boundary alone
 
   std::uint64_t simplices() const;
 };
@@ -61,9 +70,9 @@ std::unique_ptr<MeshWriter> MakeTextWriter(Draft draft, TextLayout layout);
 // Stanford's, binary, little endian, in double precision.
 std::unique_ptr<MeshWriter> MakePlyWriter(Draft draft, const FileShape& shape);
 
-// VTK's XML with raw appended data. `mesh` and its `groups`: of a file that has more than points
-// and simplices, which they then are whole; else null.
-std::unique_ptr<MeshWriter> MakeVtuWriter(Draft draft, FileShape shape, const Mesh* mesh = nullptr,
+// VTK's XML with raw appended data. `groups`: what there is to say of those of `shape`; null: it
+// is one, with nothing to say.
+std::unique_ptr<MeshWriter> MakeVtuWriter(Draft draft, FileShape shape,
                                           const std::vector<Group>* groups = nullptr);
 
 // The whole file, binary, little endian. kFileFailed for a mesh that is too fine for single

@@ -110,7 +110,7 @@ std::vector<Group> GroupsOfBoundary(const Mesh& mesh) {
 
 }  // namespace
 
-std::vector<Group> GroupsOf(const Mesh& mesh) {
+std::vector<Group> GroupsOf(const Mesh& mesh, const std::vector<std::uint8_t>& known) {
   if (mesh.is_boundary()) return GroupsOfBoundary(mesh);
   SimplexMatrix cells = OrientedSimplices(mesh);
   std::vector<Group> groups;
@@ -118,6 +118,7 @@ std::vector<Group> GroupsOf(const Mesh& mesh) {
   for (size_t j = 0; j < mesh.labels.size(); ++j) {
     regions[mesh.labels[j]].push_back(static_cast<Index>(j));
   }
+  for (const std::uint8_t label : known) regions[label];
   if (regions.empty()) groups.push_back({1, "inside", 0, cells});
   std::vector<Index> by_region;
   std::vector<std::uint8_t> labels;

@@ -25,7 +25,9 @@ struct Group {
   int dimension() const { return static_cast<int>(simplices.rows()) - 1; }
 };
 
-// All of a mesh: one group, where it has no boundary.
-std::vector<Group> GroupsOf(const Mesh& mesh);
+// All of a mesh: one group, where it has no boundary. Its simplices may be those alone that have a
+// vertex on a wall: then so are those of the regions, and the faces are those of the whole mesh,
+// which has the labels `known`, too.
+std::vector<Group> GroupsOf(const Mesh& mesh, const std::vector<std::uint8_t>& known = {});
 
 }  // namespace stellate::client

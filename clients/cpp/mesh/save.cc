@@ -2,6 +2,7 @@
 #include <cctype>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -87,12 +88,25 @@ Expected<const FileFormat*> Choose(const std::string& path, int k, int d) {
 bool IsStl(const FileFormat& format) { return format.ending == kStl; }
 
 std::unique_ptr<MeshWriter> WriterOf(const FileFormat& format, client::Draft draft,
-                                     const FileShape& shape, const Mesh* mesh = nullptr,
+                                     const FileShape& shape,
                                      const std::vector<Group>* groups = nullptr) {
   if (format.layout != nullptr)
     return client::MakeTextWriter(std::move(draft), format.layout(shape));
   if (format.ending == kPly) return client::MakePlyWriter(std::move(draft), shape);
-  return client::MakeVtuWriter(std::move(draft), shape, mesh, groups);
+  return client::MakeVtuWriter(std::move(draft), shape, groups);
+}
+
+// Those of all groups that it holds; none where it is not known on what walls a solid ends, of
+// which it holds the boundary alone.
+std::optional<std::vector<Group>> Held(const FileFormat& format, std::vector<Group> groups) {
+  if (format.holds == Holds::kGroups) return groups;
+  if (groups.size() > 1) {
+    std::erase_if(groups, [](const Group& group) { return group.dimension() == 3; });
+    return groups;
+  }
+  if (groups[0].dimension() == 3) return std::nullopt;
+  groups[0].name.clear();
+  return groups;
 }
 
 // The simplices that a format holds, and the points of those that it draws.
@@ -105,15 +119,14 @@ std::vector<Group> GroupsOf(const FileFormat& format, const Mesh& mesh, Eigen::M
     return {{1, "", 0, std::move(surface.simplices)}};
   }
   std::vector<Group> groups = client::GroupsOf(mesh);
-  if (format.holds == Holds::kGroups) return groups;
-  if (groups.size() > 1) {
-    std::erase_if(groups, [](const Group& group) { return group.dimension() == 3; });
-  } else {
-    groups[0].name.clear();
-    // It is not known on what walls it ends.
-    if (mesh.dimension() == 3) groups[0].simplices = client::BoundaryOf(groups[0].simplices);
-  }
-  return groups;
+  if (auto held = Held(format, groups)) return *std::move(held);
+  groups[0].name.clear();
+  groups[0].simplices = client::BoundaryOf(groups[0].simplices);
+  return {std::move(groups[0])};
+}
+
+void AddTo(FileShape* shape, const Group& group, std::uint64_t count) {
+  shape->groups.push_back({group.dimension(), count, group.tag, group.name});
 }
 
 Expected<void> Write(const FileFormat& format, const Mesh& mesh, client::Draft draft) {
@@ -122,12 +135,17 @@ Expected<void> Write(const FileFormat& format, const Mesh& mesh, client::Draft d
   const Eigen::MatrixXd& points = drawn.size() > 0 ? drawn : mesh.points;
   FileShape shape{mesh.dimension(), mesh.ambient_dimension(),
                   static_cast<std::uint64_t>(points.cols())};
-  for (const Group& group : groups) {
-    shape.groups.push_back({group.dimension(), static_cast<std::uint64_t>(group.simplices.cols()),
-                            group.tag, group.name});
-  }
+  for (const Group& group : groups)
+    AddTo(&shape, group, static_cast<std::uint64_t>(group.simplices.cols()));
   shape.report = mesh.report;
-  const auto writer = WriterOf(format, std::move(draft), shape, &mesh, &groups);
+  shape.has_labels = !mesh.labels.empty() || mesh.is_boundary();
+  if (!mesh.walls.empty()) shape.walls.emplace();
+  for (std::size_t i = 0; i < mesh.walls.size(); ++i) {
+    if (mesh.walls[i] == 0) continue;
+    shape.walls->on.push_back(static_cast<std::uint32_t>(i));
+    shape.walls->bits.push_back(mesh.walls[i]);
+  }
+  const auto writer = WriterOf(format, std::move(draft), shape, &groups);
   if (auto ok = writer->AddPoints(points); !ok) return ok;
   for (std::size_t i = 0; i < groups.size(); ++i) {
     if (auto ok = writer->AddCells(i, groups[i].simplices); !ok) return ok;
@@ -158,20 +176,49 @@ Expected<void> Mesh::Save(const std::string& path) const {
 
 namespace client {
 
-bool CanStream(const std::string& path, int k, int d, bool has_walls) {
+bool CanStream(const std::string& path, int k, int d, bool has_walls, bool is_boundary) {
   const auto format = Choose(path, k, d);
   if (!format || IsStl(**format) || Draft::IsSpecial(path)) return false;
-  switch ((*format)->holds) {
-    case Holds::kRows:
-      return true;
-    case Holds::kDrawn:
-      return k < 3;
-    case Holds::kPolygons:
-      return k < 3 && !has_walls;
-    case Holds::kGroups:
-      return !has_walls;
+  const Holds holds = (*format)->holds;
+  if (holds == Holds::kRows) return true;
+  if (holds == Holds::kDrawn) return k < 3;
+  if (has_walls) return !is_boundary;
+  return k < 3 || holds == Holds::kGroups;
+}
+
+bool NeedsGroups(const std::string& path, int k, int d, bool has_walls) {
+  const auto format = Choose(path, k, d);
+  return has_walls && format &&
+         ((*format)->holds == Holds::kPolygons || (*format)->holds == Holds::kGroups);
+}
+
+Expected<bool> SaveSpooled(const std::string& path, const Spool& spool, FileShape shape) {
+  const auto format = Choose(path, shape.dimension, shape.ambient_dimension);
+  if (!format) return tl::unexpected(format.error());
+  const std::optional<std::vector<Group>> groups = Held(**format, spool.Groups());
+  if (!groups) return false;
+  for (const Group& group : *groups) {
+    const bool is_region = group.dimension() == shape.dimension;
+    AddTo(&shape, group,
+          is_region ? spool.CountOf(group.label)
+                    : static_cast<std::uint64_t>(group.simplices.cols()));
   }
-  return false;
+  shape.has_labels = spool.has_labels();
+  if (!spool.walls().on.empty()) shape.walls = spool.walls();
+  Expected<Draft> draft = Draft::Begin(path);
+  if (!draft) return tl::unexpected(draft.error());
+  const auto writer = WriterOf(**format, std::move(*draft), shape, &*groups);
+  auto ok =
+      spool.EachPoints([&](const Eigen::MatrixXd& points) { return writer->AddPoints(points); });
+  for (std::size_t i = 0; ok && i < groups->size(); ++i) {
+    const Group& group = (*groups)[i];
+    const auto add = [&](const SimplexMatrix& cells) { return writer->AddCells(i, cells); };
+    ok = group.dimension() == shape.dimension ? spool.EachCells(group.label, add)
+                                              : add(group.simplices);
+  }
+  if (ok) ok = writer->Finish();
+  if (!ok) return tl::unexpected(ok.error());
+  return true;
 }
 
 Expected<StreamedFile> StreamedFile::Begin(const std::string& path, const FileShape& shape) {

@@ -98,12 +98,11 @@ struct Appended {
 
 class VtuWriter final : public MeshWriter {
  public:
-  VtuWriter(Draft draft, FileShape shape, const Mesh* mesh, const std::vector<Group>* groups)
-      : draft_(std::move(draft)), shape_(std::move(shape)), mesh_(mesh), groups_(groups) {
+  VtuWriter(Draft draft, FileShape shape, const std::vector<Group>* groups)
+      : draft_(std::move(draft)), shape_(std::move(shape)), groups_(groups) {
     const std::uint64_t n = shape_.vertices, m = shape_.simplices();
     const auto d = static_cast<std::uint64_t>(shape_.ambient_dimension);
-    const bool has_walls = mesh != nullptr && !mesh->walls.empty();
-    const bool has_labels = mesh != nullptr && (!mesh->labels.empty() || mesh->is_boundary());
+    const bool has_walls = shape_.walls.has_value(), has_labels = shape_.has_labels;
     const bool has_groups = shape_.groups.size() > 1 || has_labels;
     std::uint64_t ids = 0;
     for (const FileShape::Cells& cells : shape_.groups)
@@ -244,7 +243,16 @@ class VtuWriter final : public MeshWriter {
 
   Expected<void> AddWalls() {
     if (!arrays_[kPointWalls].is_there || arrays_[kPointWalls].is_begun) return {};
-    return Append(kPointWalls, mesh_->walls.data(), std::ssize(mesh_->walls));
+    const PointWalls& walls = *shape_.walls;
+    std::size_t next = 0;
+    for (std::uint64_t first = 0; first < shape_.vertices; first += kRows) {
+      const std::uint64_t last = std::min(shape_.vertices, first + kRows);
+      std::vector<std::uint64_t> block(last - first);
+      for (; next < walls.on.size() && walls.on[next] < last; ++next)
+        block[walls.on[next] - first] = walls.bits[next];
+      if (auto ok = Append(kPointWalls, block.data(), std::ssize(block)); !ok) return ok;
+    }
+    return Begin(kPointWalls);
   }
 
   // One row a simplex: row(vertices of it, its group if there are any, its number there).
@@ -272,7 +280,6 @@ class VtuWriter final : public MeshWriter {
 
   Draft draft_;
   FileShape shape_;
-  const Mesh* mesh_;
   const std::vector<Group>* groups_;
   std::array<Appended, kArrays> arrays_;
   std::string head_;  // until it is written
@@ -281,9 +288,9 @@ class VtuWriter final : public MeshWriter {
 
 }  // namespace
 
-std::unique_ptr<MeshWriter> MakeVtuWriter(Draft draft, FileShape shape, const Mesh* mesh,
+std::unique_ptr<MeshWriter> MakeVtuWriter(Draft draft, FileShape shape,
                                           const std::vector<Group>* groups) {
-  return std::make_unique<VtuWriter>(std::move(draft), std::move(shape), mesh, groups);
+  return std::make_unique<VtuWriter>(std::move(draft), std::move(shape), groups);
 }
 
 }  // namespace stellate::client

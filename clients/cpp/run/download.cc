@@ -53,7 +53,7 @@ class Download {
       return Saved(report, report.counts.vertices, report.counts.simplices, 0, {});
     }
     if (CanStream(paths)) {
-      PartFiles files(paths, k(), d(), ReportOf(status_));
+      PartFiles files(paths, status_, ReportOf(status_));
       const Expected<bool> fetched = FetchInto(&files);
       if (!fetched) return tl::unexpected(fetched.error());
       if (*fetched)
@@ -90,7 +90,8 @@ class Download {
 
   bool CanStream(const std::vector<std::string>& paths) const {
     return IsLast() && std::all_of(paths.begin(), paths.end(), [this](const std::string& path) {
-             return client::CanStream(path, k(), d(), status_.spec().walls() > 0);
+             return client::CanStream(path, k(), d(), status_.spec().walls() > 0,
+                                      status_.spec().boundary_only());
            });
   }
 
@@ -128,7 +129,7 @@ class Download {
     if (!fetched || !*fetched) return fetched;
     if (auto ok = CheckSize(files->vertices(), files->simplices()); !ok)
       return tl::unexpected(ok.error());
-    return true;
+    return files->WriteGroups();
   }
 
   void Tell(std::uint64_t received) const {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <filesystem>
 #include <utility>
 
 #include "wire/convert.h"
@@ -9,8 +10,14 @@
 
 namespace stellate::client {
 
-PartFiles::PartFiles(std::vector<std::string> paths, int k, int d, Report report)
-    : paths_(std::move(paths)) {
+PartFiles::PartFiles(std::vector<std::string> paths, const v1::Mesh& mesh, Report report)
+    : region_names_(mesh.spec().region_names().begin(), mesh.spec().region_names().end()) {
+  const int k = SimplexDimension(mesh.spec());
+  const int d = static_cast<int>(mesh.spec().ambient_dimension());
+  for (std::string& path : paths) {
+    const bool is_grouped = NeedsGroups(path, k, d, mesh.spec().walls() > 0);
+    (is_grouped ? grouped_ : paths_).push_back(std::move(path));
+  }
   shape_.dimension = k;
   shape_.ambient_dimension = d;
   shape_.report = std::move(report);
@@ -28,7 +35,17 @@ Expected<void> PartFiles::Begin(const v1::DownloadMeshResponse& part) {
       failures_.push_back(file.error());
     }
   }
-  if (files_.empty()) return tl::unexpected(failures_.front());
+  if (!grouped_.empty()) {
+    const std::filesystem::path folder = std::filesystem::path(grouped_[0]).parent_path();
+    Expected<Spool> spool = Spool::Begin(folder.empty() ? "." : folder.string(), shape_.dimension,
+                                         shape_.ambient_dimension, region_names_);
+    if (spool) {
+      spool_.emplace(std::move(*spool));
+    } else if (auto ok = GiveUpSpool(spool.error()); !ok) {
+      return ok;
+    }
+  }
+  if (files_.empty() && !spool_) return tl::unexpected(failures_.front());
   return {};
 }
 
@@ -40,7 +57,7 @@ Expected<void> PartFiles::ToAll(const Write& write) {
     if (!written) failures_.push_back(written.error());
     return !written;
   });
-  if (files_.empty()) return tl::unexpected(failures_.front());
+  if (files_.empty() && !spool_) return tl::unexpected(failures_.front());
   return {};
 }
 
@@ -53,8 +70,48 @@ Expected<void> PartFiles::TakePoints(const v1::DownloadMeshResponse& part) {
     return tl::unexpected(BrokenProtocol("vertices from " + std::to_string(part.first_vertex()) +
                                          " on, out of order"));
   }
+  const std::uint64_t before = vertices_;
   vertices_ += static_cast<std::uint64_t>(points->cols());
+  if (spool_) {
+    if (auto ok = TakeWalls(part, before); !ok) return ok;
+    if (const auto added = spool_->AddPoints(*points); !added) {
+      if (auto ok = GiveUpSpool(added.error()); !ok) return ok;
+    }
+  }
   return ToAll([&points](StreamedFile& file) { return file.writer->AddPoints(*points); });
+}
+
+Expected<void> PartFiles::TakeWalls(const v1::DownloadMeshResponse& part, std::uint64_t before) {
+  bool fits = part.boundary_vertices_size() == part.boundary_walls_size();
+  for (int i = 0; fits && i < part.boundary_vertices_size(); ++i) {
+    const std::uint32_t vertex = part.boundary_vertices(i);
+    fits =
+        vertex >= before && vertex < vertices_ && spool_->AddWalls(vertex, part.boundary_walls(i));
+  }
+  if (!fits) return tl::unexpected(BrokenProtocol("walls of vertices that are not beside them"));
+  return {};
+}
+
+Expected<void> PartFiles::SpoolCells(const v1::DownloadMeshResponse& part) {
+  const std::string& labels = part.cell_labels();
+  const auto count = static_cast<std::size_t>(turned_.cols());
+  const bool is_first = simplices_ == count;
+  if ((!labels.empty() && labels.size() != count) ||
+      (!is_first && labels.empty() == spool_->has_labels())) {
+    return tl::unexpected(BrokenProtocol("labels that do not fit their simplices"));
+  }
+  const auto added = spool_->AddCells(turned_, labels);
+  return added ? added : GiveUpSpool(added.error());
+}
+
+// Of what it was for no file can be written; the others go on.
+Expected<void> PartFiles::GiveUpSpool(const Error& why) {
+  for (const std::string& path : grouped_)
+    failures_.push_back({why.code, why.reason, path + ": " + why.message});
+  grouped_.clear();
+  spool_.reset();
+  if (files_.empty()) return tl::unexpected(failures_.front());
+  return {};
 }
 
 Expected<bool> PartFiles::ReadCells(const v1::DownloadMeshResponse& part) {
@@ -104,11 +161,27 @@ Expected<PartFiles::Taken> PartFiles::Take(const v1::DownloadMeshResponse& part)
   if (vertices_ > shape_.vertices || simplices_ > shape_.simplices())
     return tl::unexpected(BrokenProtocol("more of the mesh than it had announced"));
   if (ascending_.cols() == 0) return Taken::kYes;
+  if (spool_) {
+    if (auto ok = SpoolCells(part); !ok) return tl::unexpected(ok.error());
+  }
   const auto written = ToAll([this](StreamedFile& file) {
     return file.writer->AddCells(0, file.is_turned ? turned_ : ascending_);
   });
   if (!written) return tl::unexpected(written.error());
   return Taken::kYes;
+}
+
+Expected<bool> PartFiles::WriteGroups() {
+  for (const std::string& path : grouped_) {
+    shape_.groups.clear();
+    const Expected<bool> saved = SaveSpooled(path, *spool_, shape_);
+    if (!saved) {
+      failures_.push_back(saved.error());
+    } else if (!*saved) {
+      return false;
+    }
+  }
+  return true;
 }
 
 std::vector<Error> PartFiles::Finish() {

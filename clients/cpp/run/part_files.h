@@ -1,10 +1,12 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "mesh/formats.h"
+#include "mesh/spool.h"
 #include "mesh/streamed_file.h"
 #include "stellate/download.h"
 #include "stellate/v1/stellate.pb.h"
@@ -15,12 +17,13 @@ namespace stellate::client {
 // mesh that is over, whose simplices come in lexicographic order and with their orientation: of
 // another Take says so, and nothing is written.
 //
-//   PartFiles files(paths, k, d, report);
+//   PartFiles files(paths, mesh, report);
 //   while (...) if (auto ok = files.Take(part); !ok) ...;
+//   if (auto ok = files.WriteGroups(); !ok) ...;
 //   const std::vector<Error> failures = files.Finish();
 class PartFiles {
  public:
-  PartFiles(std::vector<std::string> paths, int k, int d, Report report);
+  PartFiles(std::vector<std::string> paths, const v1::Mesh& mesh, Report report);
 
   // kNotSo: the part does not come as it has to; take the mesh whole. Errors: what does not follow
   // on the parts before it; that no file can be written any more.
@@ -29,19 +32,27 @@ class PartFiles {
   std::uint64_t vertices() const { return vertices_; }    // so far
   std::uint64_t simplices() const { return simplices_; }  // so far
 
-  // Puts the files in their places; what could not be written, file by file. Call it once all
-  // vertices and simplices that were announced are there.
+  // Writes what is grouped by walls and regions. Call it once all vertices and simplices that were
+  // announced are there. False: take the mesh whole.
+  Expected<bool> WriteGroups();
+
+  // Puts the files in their places; what could not be written, file by file.
   std::vector<Error> Finish();
 
  private:
   Expected<void> Begin(const v1::DownloadMeshResponse& part);
   Expected<void> TakePoints(const v1::DownloadMeshResponse& part);
+  Expected<void> TakeWalls(const v1::DownloadMeshResponse& part, std::uint64_t before);
+  Expected<void> SpoolCells(const v1::DownloadMeshResponse& part);
+  Expected<void> GiveUpSpool(const Error& why);
   // False: not in order.
   Expected<bool> ReadCells(const v1::DownloadMeshResponse& part);
   template <typename Write>
   Expected<void> ToAll(const Write& write);
 
-  std::vector<std::string> paths_;
+  std::vector<std::string> paths_, grouped_;  // the latter by way of the spool
+  std::vector<std::string> region_names_;
+  std::optional<Spool> spool_;
   FileShape shape_;
   std::vector<StreamedFile> files_;
   std::vector<Error> failures_;

@@ -326,17 +326,37 @@ def test_walls_and_early_revisions(finished, client, tmp_path):
     assert early.report is None and early.revision == 2
     again = stellate.load_txt(tmp_path / "early.txt")
     assert len(again.points) == early.vertices < len(watched.points)
-    half = stellate.oracles.Clipped(manifolds.Torus(), [stellate.oracles.HalfSpace([1, 0, 0])])
-    cut = client.create(half, 0.3).name
-    client.serve(half, cut)
-    saved = stellate.download(cut, to=[tmp_path / "a.vtu", tmp_path / "a.msh"], server=client)
-    mesh = stellate.download(cut, server=client)
-    for ending in ("vtu", "msh"):
+
+
+def two_materials():
+    """A ball of radius 1/2 in one of radius 1."""
+    walls = [lambda x, r=r: r**2 - (x**2).sum(axis=1) for r in (1.0, 0.5)]
+    room = ([-1.2] * 3, [1.2] * 3)
+    return stellate.oracles.Solid(walls, room, labels=[0, 1, 0, 2])
+
+
+def half_torus():
+    half_spaces = [stellate.oracles.HalfSpace(normal) for normal in ([1, 0, 0], [0, 1, 0.2])]
+    return stellate.oracles.Clipped(manifolds.Torus(), half_spaces)
+
+
+@pytest.mark.parametrize("make", [half_torus, two_materials])
+def test_files_with_walls_and_regions_are_those_of_both_languages(make, client, tmp_path):
+    endings = ("vtu", "msh", "obj", "txt")
+    name = client.create(make(), 0.3).name
+    client.serve(make(), name)
+    mesh = stellate.download(name, server=client)
+    stellate.download(name, to=[tmp_path / f"a.{it}" for it in endings], server=client)
+    program = pathlib.Path(stellate.server.find_stellated()).with_name("stellate")
+    command = [program, "download", name, "-q", "--server", client.address]
+    for ending in endings:
+        command += ["-o", f"c.{ending}"]
+    subprocess.run(command, check=True, cwd=tmp_path)
+    for ending in endings:
         mesh.save(tmp_path / f"b.{ending}")
-        assert (tmp_path / f"a.{ending}").read_bytes() == (tmp_path / f"b.{ending}").read_bytes()
-    assert np.array_equal(saved.points, mesh.points)
-    assert np.array_equal(saved.cells, mesh.oriented_simplices())
-    client.delete(cut)
+        of_parts, whole, cpp = (tmp_path / f"{it}.{ending}" for it in "abc")
+        assert of_parts.read_bytes() == whole.read_bytes() == cpp.read_bytes(), ending
+    client.delete(name)
 
 
 def test_a_broken_stream_of_parts_goes_on_in_the_same_file(tmp_path):
