@@ -30,6 +30,7 @@ STATED = {
     "clients/view/package-lock.json": _NPM_LOCK,
     "clients/view/package.json": r'"version": "(\S+)"',
     "docker/Dockerfile": r"\bstellate:(\d\S*)",
+    "docker/alone.yaml": r"image: stellate:(\S+)",
     "docker/compose.yaml": r"image: stellate[\w-]*:(\S+)",
     "docker/kubernetes/kustomization.yaml": r"name: stellate[\w-]*\n    newTag: (\S+)",
     "docs/using/building.md": r"find_package\(stellate (\S+)",

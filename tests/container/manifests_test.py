@@ -228,20 +228,69 @@ class ServerOfTheManifest(unittest.TestCase):
         ).returncode
 
 
+def pinned_images() -> dict[str, str]:
+    """As docker/pin would write them, with digests of nothing."""
+    return {
+        line.split()[0]: f"{line.split()[1]}@sha256:{'0' * 64}"
+        for line in (ROOT / "docker/images.txt").read_text().splitlines()
+        if line and not line.startswith("#")
+    }
+
+
+def composed(file: pathlib.Path) -> dict[str, Any]:
+    """A compose file as docker-compose reads it."""
+    checked = subprocess.run(
+        ["docker-compose", "-f", file, "config"], capture_output=True, text=True,
+        env={**os.environ, **pinned_images()},
+    )  # fmt: skip
+    assert checked.returncode == 0, checked.stderr
+    return dict(yaml.safe_load(checked.stdout))
+
+
+class Alone(unittest.TestCase):
+    """The compose file of one server for this machine."""
+
+    def setUp(self) -> None:
+        self.all = composed(ROOT / "docker" / "alone.yaml")
+        ((self.name, self.server),) = self.all["services"].items()
+
+    def test_nobody_else_reaches_it_and_it_keeps_its_meshes(self) -> None:
+        self.assertEqual(self.server["network_mode"], "host")
+        self.assertNotIn("ports", self.server)
+        given = dict(flag.split("=") for flag in self.server["command"])
+        self.assertTrue(given["--listen"].startswith("127.0.0.1:"))
+        (volume,) = self.server["volumes"]
+        source, target = (
+            volume.split(":")[:2]
+            if isinstance(volume, str)
+            else (volume["source"], volume["target"])
+        )
+        self.assertEqual(target, given["--data-dir"])
+        self.assertIn(source, self.all["volumes"])
+        known = manifests.flags_of([os.environ["STELLATED"]])
+        self.assertLessEqual(set(given), known)
+
+    def test_it_is_confined_and_of_this_version(self) -> None:
+        self.assertTrue(self.server["read_only"])
+        self.assertEqual(self.server["cap_drop"], ["ALL"])
+        self.assertEqual(self.server["image"], f"stellate:{manifests.version()}")
+        self.assertEqual(self.server["build"]["target"], "runtime")
+
+    def test_a_server_with_its_arguments_starts(self) -> None:
+        with tempfile.TemporaryDirectory() as scratch:
+            given = dict(flag.split("=") for flag in self.server["command"])
+            folder = f"{scratch}{given['--data-dir']}"
+            with (
+                stellate.Server("--data-dir", folder, listen="127.0.0.1:0") as server,
+                stellate.Client(server) as client,
+            ):
+                self.assertEqual(client.info().version, manifests.version())
+
+
 class Compose(unittest.TestCase):
     def setUp(self) -> None:
-        pinned = {
-            line.split()[0]: f"{line.split()[1]}@sha256:{'0' * 64}"
-            for line in (ROOT / "docker/images.txt").read_text().splitlines()
-            if line and not line.startswith("#")
-        }
-        self.images = set(pinned.values())
-        checked = subprocess.run(
-            ["docker-compose", "-f", str(COMPOSE), "config"], capture_output=True, text=True,
-            env={**os.environ, **pinned},
-        )  # fmt: skip
-        self.assertEqual(checked.returncode, 0, checked.stderr)
-        self.services = yaml.safe_load(checked.stdout)["services"]
+        self.images = set(pinned_images().values())
+        self.services = composed(COMPOSE)["services"]
 
     def test_services(self) -> None:
         workers = [name for name in self.services if name.startswith("worker")]
