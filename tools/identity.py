@@ -11,6 +11,7 @@ from __future__ import annotations
 import pathlib
 import re
 import sys
+from typing import Any
 
 import tomllib
 
@@ -84,7 +85,16 @@ STATED = {
 
 
 def read() -> dict[str, str]:
-    """What identity.toml says."""
+    """What identity.toml says of who makes this."""
+    return {name: said for name, said in _read().items() if isinstance(said, str)}
+
+
+def registries() -> dict[str, str]:
+    """Where each package is uploaded, by its name in packaging/publish."""
+    return dict(_read()["registries"])
+
+
+def _read() -> dict[str, Any]:
     return tomllib.loads((ROOT / "identity.toml").read_text())
 
 

@@ -9,7 +9,7 @@ Gem::Specification.new do |gem|
   gem.homepage = 'https://stellate.example'
   gem.license = 'Apache-2.0'
   gem.required_ruby_version = '>= 3.1'
-  gem.files = Dir['lib/**/*.rb', 'README.md']
+  gem.files = Dir['lib/**/*.rb', 'README.md', 'LICENSE']
   gem.add_dependency 'google-protobuf', '>= 3.21'
   gem.add_dependency 'grpc', '>= 1.51'
   gem.metadata['bug_tracker_uri'] = 'https://stellate.example/issues'

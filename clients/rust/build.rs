@@ -3,9 +3,18 @@
 
 use std::fmt::Write;
 
+/// A folder as it is in the package, or else in the source tree.
+fn within(package: &'static str, tree: &'static str) -> &'static str {
+    if std::path::Path::new(package).is_dir() {
+        package
+    } else {
+        tree
+    }
+}
+
 /// A module of constants: first_pause = 0.1 becomes FIRST_PAUSE. All numbers are f64.
 fn constants(name: &str) -> std::io::Result<String> {
-    let path = format!("../shared/{name}.toml");
+    let path = format!("{}/{name}.toml", within("shared", "../shared"));
     println!("cargo:rerun-if-changed={path}");
     let mut module = format!("pub mod {name} {{\n");
     for line in std::fs::read_to_string(path)?.lines() {
@@ -25,7 +34,7 @@ fn main() -> std::io::Result<()> {
     let shared = constants("reconnect")? + &constants("checkpoint")?;
     let folder = std::env::var("OUT_DIR").expect("cargo sets it");
     std::fs::write(format!("{folder}/shared.rs"), shared)?;
-    let protos = "../../proto";
+    let protos = within("proto", "../../proto");
     let files = ["v1/stellate", "v1/doctor", "v1/errors", "rpc/status_details"]
         .map(|file| format!("{protos}/stellate/{file}.proto"));
     println!("cargo:rerun-if-changed={protos}");
