@@ -179,38 +179,48 @@ def test_a_disk_that_is_full_does_not_lose_the_mesh(make, server, client, tmp_pa
     assert mesh.certified and private.value.mesh.certified
 
 
-def test_ctrl_c_cancels_it_and_gives_what_there_is(server, client, tmp_path):
-    before, struck = {info.name for info in client.list()}, []
+@pytest.fixture
+def interrupted(monkeypatch):
+    """An event: SIGINT has been passed on to the server."""
+    passed_on, interrupt = threading.Event(), _run.Run.interrupt
 
-    def strike(progress):
-        if progress.vertices > 100 and not struck:
-            struck.append(progress)
-            os.kill(os.getpid(), signal.SIGINT)
+    def noted(self):
+        interrupt(self)
+        passed_on.set()
+
+    monkeypatch.setattr(_run.Run, "interrupt", noted)
+    return passed_on
+
+
+def test_ctrl_c_cancels_it_and_gives_what_there_is(server, client, interrupted, tmp_path):
+    before = {info.name for info in client.list()}
+
+    class Striking(manifolds.Torus):
+        asked = 0
+
+        def closest_point(self, x):
+            self.asked += len(x)
+            if self.asked > 500 and not interrupted.is_set():
+                os.kill(os.getpid(), signal.SIGINT)
+                assert interrupted.wait(300)
+            return super().closest_point(x)
 
     with pytest.raises(stellate.Interrupted, match="cancelled") as caught:
-        stellate.mesh(
-            manifolds.Torus(), 0.02, server=server, on_progress=strike, to=tmp_path / "a.vtu"
-        )
-    assert len(caught.value.mesh.points) > 100
+        stellate.mesh(Striking(), 0.02, server=server, to=tmp_path / "a.vtu")
+    assert isinstance(caught.value.mesh, stellate.Mesh)
     assert not list(tmp_path.iterdir())
     assert {info.name for info in client.list()} <= before
 
 
-def test_ctrl_c_while_the_file_is_written_waits_for_it(server, monkeypatch, tmp_path):
-    asked, real = threading.Event(), _run.stream
-    interrupt = _run.Run.interrupt
-
-    def noted(self):
-        interrupt(self)
-        asked.set()
+def test_ctrl_c_while_the_file_is_written_waits_for_it(server, interrupted, monkeypatch, tmp_path):
+    real = _run.stream
 
     def stream(*arguments, **more):
         os.kill(os.getpid(), signal.SIGINT)
-        assert asked.wait(300)
+        assert interrupted.wait(300)
         return real(*arguments, **more)
 
     monkeypatch.setattr(_run, "stream", stream)
-    monkeypatch.setattr(_run.Run, "interrupt", noted)
     with pytest.raises(stellate.Interrupted, match="was finished, and is in .*a.vtu"):
         stellate.mesh(manifolds.Torus(), 0.3, server=server, to=tmp_path / "a.vtu")
     assert [path.name for path in tmp_path.iterdir()] == ["a.vtu"]
