@@ -86,6 +86,50 @@ TEST_F(PointFiles, TheFirstCoordinatesAreKept) {
   EXPECT_THROW(ReadPoints(file, 7), std::invalid_argument);
 }
 
+TEST_F(PointFiles, ColumnsAreKeptByTheirTitlesOrNumbers) {
+  const std::vector<std::string> xyz = {"x", "y", "z"};
+  const std::string scan =
+      "\xef\xbb\xbftime,x,\"y\",z,what it is\r\n2026-01-01 10:00,1, 2.5,3,a wall\r\n"
+      ",0.1,-1e-3,4e30,\r\n7,-7,8,9,1\r\n";
+  EXPECT_EQ(ReadPoints(Written(".csv", scan), {}, xyz), kPoints);
+  EXPECT_EQ(ReadPoints(Written(".csv", scan), {}, {"2", "3", "4"}), kPoints);
+  EXPECT_EQ(ReadPoints(Written(".csv", scan), {}, {"z", "x"}), kPoints({2, 0}, Eigen::all));
+  EXPECT_EQ(
+      ReadPoints(Written(".txt", "t x y z\n0 1 2.5 3\n0 0.1 -1e-3 4e30\n0 -7 8 9\n"), {}, xyz),
+      kPoints);
+  EXPECT_EQ(ReadPoints(Written(".txt", "1 2.5 3\n0.1 -1e-3 4e30\n-7 8 9\n"), {}, {"3", "1"}),
+            kPoints({2, 0}, Eigen::all));
+  const std::string npy = Npy<double>("<f8", false, std::endian::little, kPoints);
+  EXPECT_EQ(ReadPoints(Written(".npy", npy), {}, {"2"}), kPoints.row(1));
+  const auto refusal = [&](const std::string& ending, const std::string& bytes,
+                           const std::vector<std::string>& columns) -> std::string {
+    try {
+      ReadPoints(Written(ending, bytes), {}, columns);
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "it was read";
+  };
+  EXPECT_THAT(refusal(".csv", scan, {"x", "height"}),
+              HasSubstr("no column 'height': there are 5, 'time', 'x', 'y', 'z', 'what it is'"));
+  EXPECT_THAT(refusal(".csv", scan, {"time"}),
+              HasSubstr("line 2: '2026-01-01 10:00' is no finite"));
+  EXPECT_THAT(refusal(".csv", "x,y\n1,2\n3\n", {"x"}), HasSubstr("line 3: has 1 columns"));
+  EXPECT_THAT(refusal(".txt", "1 2\n", {"0"}), HasSubstr("there are 2, without titles"));
+  EXPECT_THAT(refusal(".txt", "1 2\n", {"x"}), HasSubstr("no column 'x'"));
+  EXPECT_THAT(refusal(".npy", npy, {"4"}), HasSubstr("there are 3, without titles"));
+  EXPECT_THAT(refusal(".csv", "x,y\n", {"x"}), HasSubstr("no points"));
+}
+
+TEST_F(PointFiles, OtherColumnsThanXyzAreAskedAbout) {
+  const std::string scan = "X,Y,Z,intensity\n1,2,3,4\n";
+  EXPECT_THAT(Refusal(".csv", scan),
+              HasSubstr("line 1: the columns are 'X', 'Y', 'Z', 'intensity': say which are "
+                        "coordinates, by --columns x,y,z or so; if all are, by --ambient 4"));
+  EXPECT_EQ(ReadPoints(Written(".csv", scan), 4).rows(), 4);
+  EXPECT_EQ(ReadPoints(Written(".csv", "a,b,c,d\n1,2,3,4\n")).rows(), 4);
+}
+
 TEST_F(PointFiles, WhatIsWrongIsRefusedWithTheLine) {
   EXPECT_THAT(Refusal(".xyz", "1 2 3\n4 5 6\n7 8\n"),
               HasSubstr("line 3: has 2 numbers, and line 1 has 3"));

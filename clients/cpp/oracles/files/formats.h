@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "stellate/oracles/points.h"
 
@@ -20,7 +21,10 @@ Triangles ParseStl(std::string_view bytes);  // as text, or binary; equal corner
 // d x n. Refused where a number is not finite, or a point has fewer or more than others.
 Eigen::MatrixXd ParsePlyPoints(std::string_view bytes);  // of the vertices; d is 3
 Eigen::MatrixXd ParseNpy(std::string_view bytes);
-Eigen::MatrixXd ParsePointText(std::string text);
+// `all`: also columns that have other titles than x, y and z, which these are among.
+Eigen::MatrixXd ParsePointText(std::string text, bool all);
+// The columns with these titles, or numbers from 1, in this order.
+Eigen::MatrixXd ParsePointColumns(std::string_view text, const std::vector<std::string>& columns);
 
 struct Format {
   const char* ending;

@@ -3,10 +3,12 @@
 #include <iostream>
 #include <iterator>
 #include <new>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "oracles/combined/common.h"
+#include "oracles/files/columns.h"
 #include "oracles/files/contents.h"
 #include "oracles/files/formats.h"
 #include "oracles/files/lines.h"
@@ -14,8 +16,22 @@
 
 namespace stellate::oracles {
 namespace files {
+namespace {
 
-Eigen::MatrixXd ParsePointText(std::string text) {
+// Among them x, y and z, and others, which may be times, colours or labels.
+bool HasOthersThanXyz(const std::vector<std::string_view>& titles) {
+  const auto is_titled = [&](char name) {
+    return std::any_of(titles.begin(), titles.end(), [name](std::string_view title) {
+      title = Unquoted(title);
+      return title.size() == 1 && (title[0] | 0x20) == name;
+    });
+  };
+  return titles.size() > 3 && is_titled('x') && is_titled('y') && is_titled('z');
+}
+
+}  // namespace
+
+Eigen::MatrixXd ParsePointText(std::string text, bool all) {
   std::replace(text.begin(), text.end(), ',', ' ');
   Lines lines(text, '#');
   std::vector<double> numbers;
@@ -30,7 +46,15 @@ Eigen::MatrixXd ParsePointText(std::string text) {
     // What the columns are called.
     const bool is_header =
         std::exchange(is_first, false) && std::none_of(words.begin(), words.end(), is_number);
-    if (is_header) continue;
+    if (is_header) {
+      if (!all && HasOthersThanXyz(words)) {
+        lines.Refuse("the columns are " + Listed(words) +
+                     ": say which are coordinates, by --columns x,y,z or so; if all are, by "
+                     "--ambient " +
+                     std::to_string(words.size()));
+      }
+      continue;
+    }
     if (width == 0) {
       width = words.size();
       first = lines.number();
@@ -49,24 +73,49 @@ Eigen::MatrixXd ParsePointText(std::string text) {
 }  // namespace files
 namespace {
 
-Eigen::MatrixXd Parse(const std::filesystem::path& path) {
-  if (path == "-") return files::ParsePointText({std::istreambuf_iterator<char>(std::cin), {}});
+using Columns = std::vector<std::string>;
+
+constexpr std::string_view kByteOrderMark = "\xef\xbb\xbf";  // which spreadsheets begin a CSV with
+
+Eigen::MatrixXd ParseText(std::string text, bool all, const Columns& columns) {
+  if (text.starts_with(kByteOrderMark)) text.erase(0, kByteOrderMark.size());
+  return columns.empty() ? files::ParsePointText(std::move(text), all)
+                         : files::ParsePointColumns(text, columns);
+}
+
+// Of an array, whose columns have these titles, or none.
+Eigen::MatrixXd Pick(const Eigen::MatrixXd& points, const std::vector<std::string_view>& titles,
+                     const Columns& columns) {
+  if (columns.empty()) return points;
+  Eigen::MatrixXd picked(std::ssize(columns), points.cols());
+  for (Eigen::Index i = 0; i < picked.rows(); ++i) {
+    const std::string& column = columns[static_cast<size_t>(i)];
+    picked.row(i) = points.row(static_cast<Eigen::Index>(
+        files::FindColumn(column, titles, static_cast<size_t>(points.rows()))));
+  }
+  return picked;
+}
+
+Eigen::MatrixXd Parse(const std::filesystem::path& path, bool all, const Columns& columns) {
+  if (path == "-") return ParseText({std::istreambuf_iterator<char>(std::cin), {}}, all, columns);
   const std::string ending = files::EndingOf(path);
-  if (ending == ".npy") return files::ParseNpy(files::Contents(path));
-  if (ending == ".ply") return files::ParsePlyPoints(files::Contents(path));
+  if (ending == ".npy") return Pick(files::ParseNpy(files::Contents(path)), {}, columns);
+  if (ending == ".ply")
+    return Pick(files::ParsePlyPoints(files::Contents(path)), {"x", "y", "z"}, columns);
   for (const char* text : {".xyz", ".csv", ".txt"}) {
-    if (ending == text) return files::ParsePointText(files::Contents(path));
+    if (ending == text) return ParseText(files::Contents(path), all, columns);
   }
   Refuse("files of points that are read end in .ply, .npy, .csv, .xyz or .txt");
 }
 
 }  // namespace
 
-Eigen::MatrixXd ReadPoints(const std::string& path, std::optional<int> coordinates) {
+Eigen::MatrixXd ReadPoints(const std::string& path, std::optional<int> coordinates,
+                           const std::vector<std::string>& columns) {
   const std::string begin =
       (path == "-" ? "standard input" : "'" + path + "'") + " cannot be read as points: ";
   try {
-    Eigen::MatrixXd points = Parse(path);
+    Eigen::MatrixXd points = Parse(path, coordinates.has_value(), columns);
     const int d = coordinates.value_or(static_cast<int>(points.rows()));
     if (d < 1 || d > points.rows()) {
       Refuse("a point has " + std::to_string(points.rows()) + " coordinates, and " +

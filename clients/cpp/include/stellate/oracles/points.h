@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "stellate/pointwise.h"
 
@@ -61,9 +62,12 @@ Triangles ReadTriangles(const std::string& path);
 // Reads points, d x n: of .ply the x, y and z of its vertices, whatever faces it has; of .npy an
 // array (n, d); of .csv, .xyz and .txt, and of standard input, "-", a point a line, its numbers
 // between blanks or commas, after a line of titles if there is one, without what follows '#'.
-// `coordinates`: keeps the first so many of each; by default all. Throws std::invalid_argument,
-// saying which file and which line.
-Eigen::MatrixXd ReadPoints(const std::string& path, std::optional<int> coordinates = {});
+// `coordinates`: keeps the first so many of each; by default all. `columns`: keeps these, in this
+// order, by their titles or by their numbers from 1; what is in the others need not be numbers. A
+// file whose titles are x, y, z and others is refused without either: the others may be times or
+// colours. Throws std::invalid_argument, saying which file and which line.
+Eigen::MatrixXd ReadPoints(const std::string& path, std::optional<int> coordinates = {},
+                           const std::vector<std::string>& columns = {});
 
 struct TriangleMeshOptions {
   // Triangles with longer edges are filled with points of this spacing; by default the median of
