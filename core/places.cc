@@ -26,6 +26,8 @@ const char* PlaceName(Place place) {
       return "CLOSE";
     case Place::kDisagree:
       return "DISAGREE";
+    case Place::kAdded:
+      return "ADDED";
   }
   return "UNKNOWN";
 }
@@ -60,6 +62,8 @@ const char* PlaceAdvice(Place place) {
     case Place::kDisagree:
       return "stars disagree here for no cause that was found: add points, or allow to drop more "
              "of them";
+    case Place::kAdded:
+      return "no point was here: this one was added, on the surface fitted to the others";
   }
   return "";
 }

@@ -12,16 +12,17 @@ enum class Place : std::uint8_t {
   kTiled = 3,     // stars disagreed around it; a tiling of the place agrees
   kWeighted = 4,  // has a weight, by which stars agree
   // What is not resolved has one of these, the first that applies.
-  kEdge = 5,      // its star is open: M ends here, or has a hole in the sample
-  kSheets = 6,    // another part of M is as near as its neighbours
-  kNoise = 7,     // the noise is more than half of the spacing; or M has a crease or a corner there
-  kSparse = 8,    // tangent spaces turn too much from neighbour to neighbour: too few points
-  kClose = 9,     // another point is much nearer than the spacing
-  kDisagree = 10  // stars disagree for no such reason
+  kEdge = 5,    // its star is open: M ends here, or has a hole in the sample
+  kSheets = 6,  // another part of M is as near as its neighbours
+  kNoise = 7,   // the noise is more than half of the spacing; or M has a crease or a corner there
+  kSparse = 8,  // tangent spaces turn too much from neighbour to neighbour: too few points
+  kClose = 9,   // another point is much nearer than the spacing
+  kDisagree = 10,  // stars disagree for no such reason
+  kAdded = 11      // is none of the points (ReconstructionSpecification::steiner)
 };
 const char* PlaceName(Place place);    // "OK", "MERGED", ...
 const char* PlaceAdvice(Place place);  // one plain sentence: the cause and the cure
-inline constexpr int kPlaces = 11;
+inline constexpr int kPlaces = 12;
 
 // What was found on the way, besides the certificate.
 struct ReconstructionCounts {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <atomic>
 #include <cstdint>
 #include <optional>
@@ -15,6 +16,14 @@
 namespace stellate::core {
 
 inline constexpr int kMaxReconstructionDimension = 3;  // largest k
+
+// How stars that disagree are made to agree.
+enum class Weighting {
+  kAuto = 0,  // by tilings, and by weights of points where these do not do
+  // By weights of points alone: the result is the weighted tangential Delaunay complex (Chapter 3),
+  // and is refused where stars disagree.
+  kOnly = 1
+};
 
 // How to reconstruct a k-manifold M of R^d from points on it or near it (Chapter 3). Together with
 // the points, in their order, it determines the result; the number of threads does not.
@@ -33,11 +42,19 @@ struct ReconstructionSpecification {
   // The share of the points that may be left out where the others make a manifold and all do not;
   // in [0, 0.5].
   double drop = 0.001;
+  Weighting weights = Weighting::kAuto;  // kOnly: nothing is dropped or added
+  // Whether points may be added (MostAdded) where nothing else makes the stars agree.
+  bool steiner = false;
   // The caller promises that M's reach is at least this, a length. If the points have no noise, the
   // mesh may then be proved (docs/using/proof.md).
   std::optional<double> reach;
   int threads = 0;  // 0: all cores
 };
+
+// Returns how many points may be added to so many.
+inline std::uint64_t MostAdded(const ReconstructionSpecification& spec, std::uint64_t points) {
+  return spec.steiner ? std::max<std::uint64_t>(points / 100, 16) : 0;
+}
 
 // Returns kInvalidArgument or kLimitExceeded with the offending field and value, else Ok.
 Status Validate(const ReconstructionSpecification& spec);
@@ -54,19 +71,21 @@ struct PointCloud {
 // or an absurd size in a coordinate, too few points, tangent vectors that are not orthonormal.
 Status Validate(const ReconstructionSpecification& spec, const PointCloud& cloud);
 
-// A reconstruction. Its vertices are the given points, by their columns; those that are merged or
-// dropped are in no simplex.
+// A reconstruction. Its vertices are the given points, by their columns, and then those added;
+// those that are merged or dropped are in no simplex.
 struct Reconstruction {
   std::vector<std::uint32_t> simplices;  // k+1 ascending ids each, sorted
-  std::vector<Place> places;             // by point
+  std::vector<Place> places;             // by vertex
+  Eigen::MatrixXd added;                 // d x (vertices that are none of the points)
   // (point, the earlier point that it equals), by the first.
   std::vector<std::pair<std::uint32_t, std::uint32_t>> merged;
-  // The positions that the complex was built on and is certified at, d x n; empty if they are the
-  // given ones. Where the noise is large, the simplices may cross each other at the given ones.
+  // The positions that the complex was built on and is certified at, d x vertices; empty if they
+  // are the given ones. Where the noise is large, the simplices may cross each other at the given
+  // ones.
   Eigen::MatrixXd smoothed;
   Eigen::MatrixXd tangents;     // as PointCloud::tangents: given or estimated
-  std::vector<double> weights;  // by point, squared lengths; empty if there are none
-  std::vector<double> noise;    // by point: rms distance to the fitted surface around, length
+  std::vector<double> weights;  // by vertex, squared lengths; empty if there are none
+  std::vector<double> noise;    // by vertex: rms distance to the fitted surface around, length
   // Report::reconstruction is set. The certificate is about the complex at the smoothed positions
   // if there are any. Its level: kDecided  the complex is a closed manifold (or one with boundary),
   // its stars embed; the

@@ -230,6 +230,8 @@ struct Certificate {
 
   Violations violations;
   std::optional<ProtectionReport> protection;  // if it was asked for, and the mesh is a complex
+  // Over Z/2, from dimension 0 on, of a closed manifold (ClosedBettiNumbers); empty: not computed.
+  std::vector<std::int64_t> betti;
 };
 
 struct Report {

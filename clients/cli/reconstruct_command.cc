@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <exception>
 #include <iostream>
+#include <map>
 #include <utility>
 
 #include "progress_bar.h"
@@ -22,6 +23,12 @@ ReconstructCommand::ReconstructCommand(CLI::App& parent)
   outputs_.AddTo(command_);
   command_->add_option("--ambient", coordinates_,
                        "coordinates of a point; the first of each line, where there are more");
+  command_
+      ->add_option(
+          "--columns", columns_,
+          "the columns that are coordinates, by their titles, or their numbers from 1: x,y,z")
+      ->delimiter(',')
+      ->excludes("--ambient");
   command_->add_option("--noise", options_.noise,
                        "standard deviation of each coordinate, a length; 0: none; default: as the "
                        "points show");
@@ -30,6 +37,17 @@ ReconstructCommand::ReconstructCommand(CLI::App& parent)
   command_->add_option("--drop", options_.drop, "share of the points that may be left out")
       ->capture_default_str();
   command_->add_flag("--open", open_, "the manifold may have a boundary");
+  const std::map<std::string, Weighting> weightings = {{"auto", Weighting::kAuto},
+                                                       {"only", Weighting::kOnly}};
+  command_
+      ->add_option("--weights", options_.weights,
+                   "auto: of points where tilings do not make stars agree; only: no tilings, the "
+                   "weighted tangential Delaunay complex")
+      ->transform(CLI::CheckedTransformer(weightings).description(""))
+      ->default_str("auto");
+  command_->add_flag(
+      "--steiner", options_.steiner,
+      "vertices may be added, after the points, where nothing else makes stars agree");
   server_.AddReconnect(command_);
   command_->add_option("--report", report_, "file for the report as JSON");
   command_->add_flag("--json", json_, "print the report as JSON");
@@ -41,7 +59,7 @@ ReconstructCommand::ReconstructCommand(CLI::App& parent)
 int ReconstructCommand::Run(std::stop_token stop) {
   Eigen::MatrixXd points;
   try {
-    points = oracles::ReadPoints(points_, coordinates_);
+    points = oracles::ReadPoints(points_, coordinates_, columns_);
   } catch (const std::exception& error) {
     return PrintError({ErrorCode::kRefused, "", error.what()});
   }

@@ -3,6 +3,7 @@
 #include <CLI/App.hpp>
 #include <stop_token>
 #include <string>
+#include <vector>
 
 #include "outputs.h"
 #include "server_options.h"
@@ -25,6 +26,7 @@ class ReconstructCommand {
   ReconstructOptions options_;
   std::string points_;
   std::optional<int> coordinates_;
+  std::vector<std::string> columns_;
   Outputs outputs_;
   std::string report_;
   bool open_ = false, json_ = false, quiet_ = false;

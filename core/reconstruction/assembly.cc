@@ -9,9 +9,11 @@
 #include <span>
 #include <utility>
 
+#include "core/base/infinity.h"
 #include "core/base/interruption.h"
 #include "core/base/vector_ops.h"
 #include "core/index/indexed_points.h"
+#include "core/reconstruction/added_points.h"
 #include "core/reconstruction/tiled_stars.h"
 #include "core/reconstruction/weights.h"
 
@@ -30,6 +32,7 @@ constexpr double kMostLeft = 0.02;
 constexpr std::size_t kFewLeft = 64;
 constexpr int kSweeps = 6;
 constexpr int kDropRounds = 12;
+constexpr int kAddRounds = 6;
 
 void SortOut(std::vector<std::uint32_t>* ids) {
   std::sort(ids->begin(), ids->end());
@@ -39,14 +42,13 @@ void SortOut(std::vector<std::uint32_t>* ids) {
 template <int K>
 class Assembler {
  public:
-  Assembler(const FittedCloud& cloud, std::uint64_t most_dropped)
-      : cloud_(cloud), most_dropped_(most_dropped), spacing_(Median(cloud.spacing)) {}
+  Assembler(FittedCloud* cloud, const AssemblyRequest& request)
+      : cloud_(*cloud), request_(request), own_(cloud->size), spacing_(Median(cloud->spacing)) {}
 
-  Assembly Run(bool exudes, FunctionRef<void(double)> done) {
+  Assembly Run(FunctionRef<void(double)> done) {
     std::vector<std::uint32_t> all(cloud_.size);
     std::iota(all.begin(), all.end(), 0u);
-    if constexpr (K == 3)
-      if (exudes && Exude(all, done)) return std::move(result_);
+    if ((request_.exudes || request_.weights_only) && Exude(all, done)) return std::move(result_);
     Begin(BuildAll(all, K >= 3 ? CentreRule::kCommonCentre : CentreRule::kTangentSpace));
     done(0.5);
     if (K >= 3 && IsWorthMore()) Begin(BuildAll(all, CentreRule::kTangentSpace));
@@ -55,30 +57,40 @@ class Assembler {
     done(0.85);
     int round = 0;
     while (round < kDropRounds && IsWorthMore() && Drop()) ++round;
+    done(0.9);
+    for (round = 0; round < kAddRounds && IsWorthMore() && Add();) ++round;
+    RemoveVain();
     done(1);
-    for (const std::uint32_t p : left_) result_.places[p] = Place::kDisagree;
+    MarkLeft();
     return std::move(result_);
   }
 
  private:
   TiledStars BuildAll(std::vector<std::uint32_t> ids, CentreRule rule) {
-    return BuildTiledStars<K>(cloud_, {std::move(ids), rule, nullptr, spacing_});
+    return BuildTiledStars<K>(cloud_, {.ids = std::move(ids), .rule = rule, .spacing = spacing_});
   }
 
-  // Takes the stars of weighted points if all agree. Returns whether they do.
+  // Takes the stars of weighted points if all agree, or if there is to be nothing else. Returns
+  // whether it did.
   bool Exude(const std::vector<std::uint32_t>& all, FunctionRef<void(double)> done) {
-    std::vector<double> weights =
-        FindExudingWeights<K>(cloud_, [&](double share) { done(0.5 * share); });
-    if (weights.empty()) return false;
-    TiledStars stars =
-        BuildTiledStars<K>(cloud_, {all, CentreRule::kTangentSpace, &weights, spacing_});
-    if (!stars.unfilled.empty()) return false;
+    ExudingWeights found = FindExudingWeights<K>(cloud_, [&](double share) { done(0.5 * share); });
+    if (!found.agree && !request_.weights_only) return false;
+    TiledStars stars = BuildTiledStars<K>(cloud_, {.ids = all,
+                                                   .weights = &found.weights,
+                                                   .spacing = spacing_,
+                                                   .tiles = !request_.weights_only});
+    if (!stars.unfilled.empty() && !request_.weights_only) return false;
     Begin(std::move(stars));
     for (std::uint32_t p = 0; p < cloud_.size; ++p)
-      if (weights[p] > 0) result_.places[p] = Place::kWeighted;
-    result_.weights = std::move(weights);
+      if (found.weights[p] > 0) result_.places[p] = Place::kWeighted;
+    result_.weights = std::move(found.weights);
+    MarkLeft();
     done(1);
     return true;
+  }
+
+  void MarkLeft() {
+    for (const std::uint32_t p : left_) result_.places[p] = Place::kDisagree;
   }
 
   void Begin(TiledStars stars) {
@@ -111,7 +123,7 @@ class Assembler {
     if (!IsFewLeft()) return;
     std::vector<std::uint32_t> hopeless;
     for (const std::uint32_t p : left_)
-      if (IsHopeless(p)) hopeless.push_back(p);
+      if (p < own_ && IsHopeless(p)) hopeless.push_back(p);
     for (const std::uint32_t p : left_) {
       ThrowIfInterrupted();
       const double far = kHopelessNear * cloud_.spacing[p];
@@ -127,10 +139,11 @@ class Assembler {
 
   bool IsWorthMore() const { return !hopeful_.empty(); }
 
+  // Of the points that the cloud had.
   const BallTree& Tree() {
     if (!points_) {
       points_.emplace(cloud_.d);
-      for (std::uint32_t p = 0; p < cloud_.size; ++p) points_->AddUnindexed(cloud_.Position(p));
+      for (std::uint32_t p = 0; p < own_; ++p) points_->AddUnindexed(cloud_.Position(p));
       points_->Index();
     }
     return points_->tree();
@@ -145,6 +158,8 @@ class Assembler {
       Tree().VisitNear(
           cloud_.Position(p), [&] { return radius; },
           [&](std::uint32_t q, double) { found[q] = result_.places[q] != Place::kDropped; });
+      for (std::uint32_t q = own_; q < cloud_.size; ++q)
+        if (IsNear(p, {q}, radius)) found[q] = 1;
     }
     std::vector<std::uint32_t> ids;
     for (std::uint32_t p = 0; p < cloud_.size; ++p)
@@ -173,15 +188,14 @@ class Assembler {
   bool Drop() {
     std::vector<std::uint32_t> out;
     for (const std::uint32_t p : InOrderOfDropping()) {
-      if (dropped_ + out.size() >= most_dropped_) break;
+      if (dropped_ + out.size() >= request_.most_dropped) break;
       if (!IsNear(p, out, kChanged * cloud_.spacing[p])) out.push_back(p);
     }
     if (out.empty()) return false;
     std::vector<std::uint32_t> changed = Around(hopeful_, kChanged);
     for (const std::uint32_t p : out) result_.places[p] = Place::kDropped;
     dropped_ += out.size();
-    Replace(std::move(changed), Around(hopeful_, kDeciding),
-            result_.weights.empty() ? nullptr : &result_.weights);
+    Replace(std::move(changed), Around(hopeful_, kDeciding), Weights());
     FindHopeful();
     return true;
   }
@@ -200,12 +214,60 @@ class Assembler {
     return order;
   }
 
+  // Adds a point to each cavity, as far as that is allowed. Returns whether it did. It is a vertex
+  // of the cavity until all stars there agree.
+  bool Add() {
+    const std::uint32_t before = cloud_.size;
+    std::vector<std::uint32_t> seeds;
+    for (const std::uint32_t seed : hopeful_) {
+      if (cloud_.size - own_ >= request_.most_added) break;
+      if (IsNear(seed, seeds, kChanged * cloud_.spacing[seed])) continue;
+      seeds.push_back(seed);
+      std::vector<std::uint32_t> cavity;
+      for (const std::uint32_t p : left_)
+        if (IsNear(p, {seed}, kHopelessNear * cloud_.spacing[seed])) cavity.push_back(p);
+      if (const auto emptiest = FindEmptiest(cloud_, cavity)) AddPoint(Tree(), *emptiest, &cloud_);
+    }
+    if (cloud_.size == before) return false;
+    for (std::uint32_t p = before; p < cloud_.size; ++p) left_.push_back(p);
+    result_.places.resize(cloud_.size, Place::kAdded);
+    result_.radii.resize(cloud_.size, kInfinity);
+    if (!result_.weights.empty()) result_.weights.resize(cloud_.size, 0);
+    Replace(Around(left_, kChanged), Around(left_, kDeciding), Weights());
+    FindHopeful();
+    return true;
+  }
+
+  // Removes the points that were added in vain.
+  void RemoveVain() {
+    std::vector<std::uint32_t> names(cloud_.size);
+    for (const std::uint32_t p : result_.simplices) names[p] = 1;
+    std::vector<std::uint32_t> vain;
+    for (std::uint32_t p = 0; p < cloud_.size; ++p) {
+      if (p >= own_ && names[p] == 0) vain.push_back(p);
+      names[p] = p - static_cast<std::uint32_t>(vain.size());
+    }
+    for (std::uint32_t& p : result_.simplices) p = names[p];
+    for (auto p = vain.rbegin(); p != vain.rend(); ++p) {
+      RemovePoint(*p, &cloud_);
+      result_.places.erase(result_.places.begin() + *p);
+      result_.radii.erase(result_.radii.begin() + *p);
+      if (!result_.weights.empty()) result_.weights.erase(result_.weights.begin() + *p);
+    }
+    std::erase_if(left_, [&](std::uint32_t p) { return p >= own_; });
+  }
+
+  const std::vector<double>* Weights() const {
+    return result_.weights.empty() ? nullptr : &result_.weights;
+  }
+
   std::vector<std::uint32_t> Replace(std::vector<std::uint32_t> changed,
                                      std::vector<std::uint32_t> deciding,
                                      const std::vector<double>* weights);
 
-  const FittedCloud& cloud_;
-  const std::uint64_t most_dropped_;
+  FittedCloud& cloud_;
+  const AssemblyRequest request_;
+  const std::uint32_t own_;  // points that the cloud had
   const double spacing_;
   Assembly result_;
   std::vector<std::uint32_t> left_;     // vertices of cavities that are not filled, ascending
@@ -325,7 +387,7 @@ std::vector<std::uint32_t> Assembler<K>::Replace(std::vector<std::uint32_t> chan
                                                  std::vector<std::uint32_t> deciding,
                                                  const std::vector<double>* weights) {
   const TiledStars stars =
-      BuildTiledStars<K>(cloud_, {deciding, CentreRule::kTangentSpace, weights, spacing_});
+      BuildTiledStars<K>(cloud_, {.ids = deciding, .weights = weights, .spacing = spacing_});
   PartExchange<K> exchange(changed, cloud_.size, result_.simplices, stars.simplices);
   for (const std::uint32_t p : stars.unfilled) exchange.Refuse(p);
   result_.simplices = exchange.Result();
@@ -338,7 +400,8 @@ std::vector<std::uint32_t> Assembler<K>::Replace(std::vector<std::uint32_t> chan
     if (result_.places[p] == Place::kDropped) continue;
     const bool weighted = weights && (*weights)[p] > 0;
     const bool tiled = std::binary_search(stars.tiled.begin(), stars.tiled.end(), p);
-    result_.places[p] = weighted ? Place::kWeighted : tiled ? Place::kTiled : Place::kOk;
+    if (p < own_)
+      result_.places[p] = weighted ? Place::kWeighted : tiled ? Place::kTiled : Place::kOk;
     const auto at = std::lower_bound(deciding.begin(), deciding.end(), p) - deciding.begin();
     result_.radii[p] = stars.radii[static_cast<std::size_t>(at)];
   }
@@ -348,13 +411,13 @@ std::vector<std::uint32_t> Assembler<K>::Replace(std::vector<std::uint32_t> chan
 }  // namespace
 
 template <int K>
-Assembly Assemble(const FittedCloud& cloud, std::uint64_t most_dropped, bool exudes,
+Assembly Assemble(FittedCloud* cloud, const AssemblyRequest& request,
                   FunctionRef<void(double)> done) {
-  return Assembler<K>(cloud, most_dropped).Run(exudes, done);
+  return Assembler<K>(cloud, request).Run(done);
 }
 
-template Assembly Assemble<1>(const FittedCloud&, std::uint64_t, bool, FunctionRef<void(double)>);
-template Assembly Assemble<2>(const FittedCloud&, std::uint64_t, bool, FunctionRef<void(double)>);
-template Assembly Assemble<3>(const FittedCloud&, std::uint64_t, bool, FunctionRef<void(double)>);
+template Assembly Assemble<1>(FittedCloud*, const AssemblyRequest&, FunctionRef<void(double)>);
+template Assembly Assemble<2>(FittedCloud*, const AssemblyRequest&, FunctionRef<void(double)>);
+template Assembly Assemble<3>(FittedCloud*, const AssemblyRequest&, FunctionRef<void(double)>);
 
 }  // namespace stellate::core

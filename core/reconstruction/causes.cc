@@ -168,7 +168,7 @@ Causes FindCauses(const FittedCloud& cloud, const Assembly& assembly, bool edges
   Causes causes;
   causes.places.assign(cloud.size, Place::kOk);
   ParallelFor(cloud.size, [&](std::uint32_t p) {
-    if (assembly.places[p] == Place::kDropped) return;
+    if (assembly.places[p] == Place::kDropped || assembly.places[p] == Place::kAdded) return;
     const bool resolved = assembly.places[p] != Place::kDisagree;
     Place& cause = causes.places[p];
     if (!(assembly.radii[p] <= OpenRadius(cloud, p)) && !(edges_allowed && resolved))

@@ -86,6 +86,12 @@ class Judge {
  private:
   void JudgeReach() {
     x_.certificate.declared_reach = *spec_.reach;
+    if (known_.added > 0) {
+      x_.findings.Warn(
+          "Not proved for the declared reach: vertices were added, and the proof is about points "
+          "that lie on the manifold.");
+      return;
+    }
     if (spec_.noise != 0.0) {
       x_.findings.Warn(
           "Not proved for the declared reach: the proof is about points that lie on the manifold; "
@@ -112,6 +118,10 @@ class Judge {
 
   void Warn() {
     const int k = spec_.dimension;
+    if (known_.added > 0)
+      x_.findings.Warn(Message(known_.added, known_.added == 1 ? " vertex is" : " vertices are",
+                               " none of the points: added where stars disagreed, on the surface "
+                               "fitted to the points, as the last of all."));
     if (known_.tangents_given) return;
     for (int other = 0; other <= 4; ++other) {
       if (other == k || counts_.looks[other] < kSomeOther) continue;
@@ -157,10 +167,19 @@ class Judge {
     c.verdict = Verdict();
   }
 
+  std::string Causes() const {
+    const std::string causes = DescribeCauses(mesh_, known_);
+    if (spec_.weights != Weighting::kOnly || counts_.unfilled_vertices == 0) return causes;
+    return Message(causes, ". No weights were found by which all stars agree, and at ",
+                   counts_.unfilled_vertices,
+                   " points they do not: thin the points to an even spacing, or let tilings fill "
+                   "such places (weights = auto)");
+  }
+
   // Why a manifold is not certified.
   std::string WhatIsMissing() const {
     if (std::string other = OtherDimension(); !other.empty()) return other;
-    if (known_.against > 0) return DescribeCauses(mesh_, known_);
+    if (known_.against > 0) return Causes();
     if (!LooksRight())
       return Message("most places do not look ", spec_.dimension, "-dimensional, see the warnings");
     return "it has a boundary where they end, and points alone do not tell an end from a part that "
@@ -194,7 +213,7 @@ class Judge {
     }
     const std::string other = OtherDimension();
     std::string causes;
-    if (known_.against > 0) causes = Message("something is wrong ", DescribeCauses(mesh_, known_));
+    if (known_.against > 0) causes = Message("something is wrong ", Causes());
     if (!other.empty()) causes = other + (causes.empty() ? "" : ". As it is, ") + causes;
     return Message("Not certified: ",
                    causes.empty() ? std::string()

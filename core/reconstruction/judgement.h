@@ -11,8 +11,10 @@ namespace stellate::core {
 
 // What is known of a finished reconstruction besides its mesh.
 struct KnownOfPoints {
-  const double* given = nullptr;  // the points as they came, d each; the mesh may have moved them
-  std::vector<Place> causes;      // by point: kOk, or what the points say against the mesh there
+  const double* given = nullptr;  // the points as they came, and those added, d each; the mesh may
+                                  // have moved them
+  std::uint64_t added = 0;        // vertices that are none of the points
+  std::vector<Place> causes;      // by vertex: kOk, or what the points say against the mesh there
   std::uint64_t against = 0;      // such points
   bool tangents_given = false;
   // The sine of the angle between the mesh's tangent spaces and M's is at most this over the reach,

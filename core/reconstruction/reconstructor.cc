@@ -122,42 +122,51 @@ class Reconstructor {
   }
 
   void Assemble() {
-    const auto dropped = static_cast<std::uint64_t>(spec_.drop * static_cast<double>(n_));
+    AssemblyRequest request;
+    request.most_dropped = static_cast<std::uint64_t>(spec_.drop * static_cast<double>(n_));
+    request.most_added = MostAdded(spec_, n_);
     // Tetrahedra that tilt are what a proof fails by; surfaces have none, and are proved as they
     // are.
-    const bool exudes = spec_.reach && spec_.noise == 0.0 && n_ <= kMostExuded;
+    request.exudes = k_ == 3 && spec_.reach && spec_.noise == 0.0 && n_ <= kMostExuded;
+    request.weights_only = spec_.weights == Weighting::kOnly;
     const auto done = [&](double share) {
       watch_.Advance(share < 1 ? ReconstructionPhase::kFilling : ReconstructionPhase::kCertifying,
                      kFittedBy + share * (kAssembledBy - kFittedBy));
     };
     switch (spec_.dimension) {
       case 1:
-        assembly_ = core::Assemble<1>(cloud_, dropped, exudes, done);
+        assembly_ = core::Assemble<1>(&cloud_, request, done);
         return;
       case 2:
-        assembly_ = core::Assemble<2>(cloud_, dropped, exudes, done);
+        assembly_ = core::Assemble<2>(&cloud_, request, done);
         return;
       default:
         static_assert(kMaxReconstructionDimension == 3);
-        assembly_ = core::Assemble<3>(cloud_, dropped, exudes, done);
+        assembly_ = core::Assemble<3>(&cloud_, request, done);
     }
   }
 
-  // Turns all that is by distinct point into the same by given point.
+  // Turns all that is by point of the cloud into the same by vertex: the given points, and then
+  // those added.
   void TakeToRows() {
-    const std::vector<std::uint32_t>& rows = distinct_.rows;
+    const auto distinct = static_cast<std::uint32_t>(distinct_.rows.size());
+    std::vector<std::uint32_t>& rows = distinct_.rows;
+    for (std::uint32_t p = distinct; p < cloud_.size; ++p)
+      rows.push_back(static_cast<std::uint32_t>(n_) + p - distinct);
+    vertices_ = n_ + cloud_.size - distinct;
     const auto d = static_cast<Eigen::Index>(d_), k = static_cast<Eigen::Index>(k_);
-    const auto n = static_cast<Eigen::Index>(n_);
+    const auto n = static_cast<Eigen::Index>(vertices_);
+    TakeAdded(distinct);
     result_.simplices = std::move(assembly_.simplices);
     for (std::uint32_t& id : result_.simplices) id = rows[id];
-    result_.places.assign(n_, Place::kMerged);
-    result_.noise.resize(n_);
-    known_.causes.assign(n_, Place::kOk);
+    result_.places.assign(vertices_, Place::kMerged);
+    result_.noise.resize(vertices_);
+    known_.causes.assign(vertices_, Place::kOk);
     known_.against = causes_.count;
-    if (!assembly_.weights.empty()) result_.weights.resize(n_);
+    if (!assembly_.weights.empty()) result_.weights.resize(vertices_);
     result_.tangents.resize(d * k, n);
-    if (cloud_.any_smoothed) result_.smoothed = given_.points;
-    tangents_.resize(n_ * d_ * k_);
+    if (cloud_.any_smoothed) result_.smoothed = positions();
+    tangents_.resize(vertices_ * d_ * k_);
     const auto take = [&](std::uint32_t row, std::size_t p) {
       const double* const tangent = cloud_.Tangent(static_cast<std::uint32_t>(p));
       std::copy_n(tangent, d_ * k_, tangents_.data() + row * d_ * k_);
@@ -181,6 +190,20 @@ class Reconstructor {
     result_.merged = std::move(distinct_.merged);
   }
 
+  void TakeAdded(std::uint32_t distinct) {
+    known_.added = cloud_.size - distinct;
+    if (known_.added == 0) return;
+    result_.added.resize(given_.points.rows(), static_cast<Eigen::Index>(known_.added));
+    std::copy_n(cloud_.Position(distinct), result_.added.size(), result_.added.data());
+    all_points_.resize(given_.points.rows(), static_cast<Eigen::Index>(vertices_));
+    all_points_ << given_.points, result_.added;
+  }
+
+  // All vertices, where they were given, or added.
+  const Eigen::MatrixXd& positions() const {
+    return known_.added > 0 ? all_points_ : given_.points;
+  }
+
   void Count() {
     ReconstructionCounts counts;
     for (const Place place : result_.places) ++counts.places[static_cast<std::size_t>(place)];
@@ -201,18 +224,19 @@ class Reconstructor {
     for (double& share : counts.looks) share /= cloud_.size;
     result_.report.reconstruction = counts;
     result_.report.termination = Termination::kConverged;
-    result_.report.counts.vertices = n_;
+    result_.report.counts.vertices = vertices_;
     result_.report.counts.simplices = result_.simplices.size() / (k_ + 1);
     result_.report.counts.duplicates = result_.merged.size();
   }
 
   void Judge() {
-    unused_.resize(n_);
-    for (std::size_t p = 0; p < n_; ++p)
+    unused_.resize(vertices_);
+    for (std::size_t p = 0; p < vertices_; ++p)
       unused_[p] = result_.places[p] == Place::kMerged || result_.places[p] == Place::kDropped;
-    known_.given = given_.points.data();
+    known_.given = positions().data();
     known_.tangents_given = given_.tangents.size() > 0 && !cloud_.any_smoothed;
-    const bool by_differences = spec_.reach && spec_.noise == 0.0 && !known_.tangents_given;
+    const bool by_differences =
+        spec_.reach && spec_.noise == 0.0 && !known_.tangents_given && known_.added == 0;
     ReconstructionSpecification spec = spec_;
     if (by_differences) spec.reach.reset();
     MeshView mesh = ViewOf(tangents_);
@@ -231,8 +255,8 @@ class Reconstructor {
     MeshView mesh;
     mesh.k = spec_.dimension;
     mesh.d = spec_.ambient_dimension;
-    mesh.vertices = n_;
-    mesh.points = result_.smoothed.size() > 0 ? result_.smoothed.data() : given_.points.data();
+    mesh.vertices = vertices_;
+    mesh.points = result_.smoothed.size() > 0 ? result_.smoothed.data() : positions().data();
     mesh.tangents = tangents.data();
     mesh.simplices = &result_.simplices;
     mesh.unused = unused_.data();
@@ -270,12 +294,14 @@ class Reconstructor {
   const PointCloud& given_;
   ReconstructionWatch& watch_;
   const std::size_t n_, d_, k_;
+  std::size_t vertices_ = 0;
   Distinct distinct_;
   FittedCloud cloud_;
   Assembly assembly_;
   Causes causes_;
-  std::vector<double> tangents_;      // by given point, k rows of d each
-  std::vector<std::uint8_t> unused_;  // by given point: in no simplex, on purpose
+  Eigen::MatrixXd all_points_;        // d x vertices, if some were added
+  std::vector<double> tangents_;      // by vertex, k rows of d each
+  std::vector<std::uint8_t> unused_;  // by vertex: in no simplex, on purpose
   KnownOfPoints known_;
   Reconstruction result_;
 };

@@ -36,8 +36,14 @@ TiledStars BuildTiledStars(const FittedCloud& cloud, const TilingRequest& reques
     if (std::any_of(weights.begin(), weights.end(), [](double w) { return w > 0; }))
       stars.SetProtectingBalls(std::move(weights));
   }
-  FilledCavities filled = FillCavities<K>(
-      stars, {.epsilon = kInfinity, .radius_edge_bound = kInfinity, .sliver_bound = 0});
+  FilledCavities filled = FillCavities<K>(stars, {.epsilon = request.tiles ? kInfinity : 0,
+                                                  .radius_edge_bound = kInfinity,
+                                                  .sliver_bound = 0});
+  if (!request.tiles) {
+    filled.unfilled.insert(filled.unfilled.end(), filled.tiled.begin(), filled.tiled.end());
+    std::sort(filled.unfilled.begin(), filled.unfilled.end());
+    filled.tiled.clear();
+  }
   TiledStars result;
   result.doubtful = filled.inconsistent;
   result.cavities = filled.cavities;

@@ -13,9 +13,10 @@ namespace stellate::core {
 struct TilingRequest {
   std::vector<std::uint32_t> ids;  // the points, ascending
   CentreRule rule = CentreRule::kTangentSpace;
-  // By point of the cloud, squared lengths; empty: none.
+  // By point of the cloud, squared lengths; null: none.
   const std::vector<double>* weights = nullptr;
   double spacing = 0;  // a typical one of the whole cloud, length
+  bool tiles = true;   // false: all cavities are left, even where nothing is missing
 };
 
 // The stars' consistent simplices, and tilings of the cavities where stars disagree, by ids of the

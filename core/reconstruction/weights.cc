@@ -38,6 +38,8 @@ constexpr double kUpright2 = 0.1786;
 // Sweeps over all points: most ever, and without fewer simplices to fix.
 constexpr int kSweepsOfAll = 40;
 constexpr int kVainSweeps = 6;
+// Weights chosen for a point before the search gives up, on the average: one does for even points.
+constexpr std::size_t kMostChoices = 4;
 
 // The half-spaces of a cell, by number.
 template <int D>
@@ -135,12 +137,14 @@ class WeightSearch {
   bool RunOnAll(FunctionRef<void(double)> done) {
     for (const bool exudes : {false, true}) {
       exudes_ = exudes;
-      std::size_t fewest = std::numeric_limits<std::size_t>::max();
+      std::size_t fewest = std::numeric_limits<std::size_t>::max(), choices = 0;
       int vain = 0;
       for (int sweep = 0; sweep < kSweepsOfAll; ++sweep) {
         std::set<std::uint32_t> at;
         const std::size_t bad = FindBad(&at);
         if (bad == 0 || vain == kVainSweeps) break;
+        choices += at.size();
+        if (choices > kMostChoices * ids_.size()) break;
         vain = bad < fewest ? 0 : vain + 1;
         fewest = std::min(fewest, bad);
         if (vain > 0)
@@ -152,10 +156,11 @@ class WeightSearch {
         }
         done((exudes ? 0.5 : 0) + 0.5 * sweep / kSweepsOfAll);
       }
+      exudes_ = false;
+      std::set<std::uint32_t> at;
+      if (FindBad(&at) > 0) return false;
     }
-    exudes_ = false;
-    std::set<std::uint32_t> at;
-    return FindBad(&at) == 0;
+    return true;
   }
   double weight(std::uint32_t p) const { return weights_[p]; }
 
@@ -507,17 +512,20 @@ std::vector<std::uint32_t> AddWeights(const FittedCloud& cloud,
 }
 
 template <int K>
-std::vector<double> FindExudingWeights(const FittedCloud& cloud, FunctionRef<void(double)> done) {
+ExudingWeights FindExudingWeights(const FittedCloud& cloud, FunctionRef<void(double)> done) {
   std::vector<std::uint32_t> all(cloud.size);
   std::iota(all.begin(), all.end(), 0u);
-  std::vector<double> weights(cloud.size, 0.0);
-  WeightSearch<K> search(cloud, all, weights);
-  if (!search.RunOnAll(done)) return {};
-  for (std::uint32_t p = 0; p < cloud.size; ++p) weights[p] = search.weight(p);
-  return weights;
+  ExudingWeights found;
+  found.weights.resize(cloud.size);
+  WeightSearch<K> search(cloud, all, found.weights);
+  found.agree = search.RunOnAll(done);
+  for (std::uint32_t p = 0; p < cloud.size; ++p) found.weights[p] = search.weight(p);
+  return found;
 }
 
-template std::vector<double> FindExudingWeights<3>(const FittedCloud&, FunctionRef<void(double)>);
+template ExudingWeights FindExudingWeights<1>(const FittedCloud&, FunctionRef<void(double)>);
+template ExudingWeights FindExudingWeights<2>(const FittedCloud&, FunctionRef<void(double)>);
+template ExudingWeights FindExudingWeights<3>(const FittedCloud&, FunctionRef<void(double)>);
 
 template std::vector<std::uint32_t> AddWeights<1>(const FittedCloud&,
                                                   const std::vector<std::uint32_t>&,

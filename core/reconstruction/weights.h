@@ -34,11 +34,16 @@ std::vector<std::uint32_t> AddWeights(const FittedCloud& cloud,
                                       const std::vector<std::uint32_t>& centres, int sweeps,
                                       std::vector<double>* weights);
 
-// Returns weights of all points, as AddWeights chooses them, by which all stars in tangent spaces
-// agree; none if none were found. As far as weights can, no simplex tilts by more than 65 degrees
-// against the tangent space at a vertex: a sliver counts half of a simplex about which stars
-// disagree. For K = 3: about a millisecond a point. done(share) is called now and then.
+struct ExudingWeights {
+  std::vector<double> weights;  // by point of the cloud, squared lengths
+  bool agree = false;           // whether all stars agree by them
+};
+
+// Chooses weights of all points, as AddWeights does, by which stars in tangent spaces agree. As far
+// as weights can, no simplex tilts by more than 65 degrees against the tangent space at a vertex: a
+// sliver counts half of a simplex about which stars disagree. For K = 3: about a millisecond a
+// point. done(share) is called now and then.
 template <int K>
-std::vector<double> FindExudingWeights(const FittedCloud& cloud, FunctionRef<void(double)> done);
+ExudingWeights FindExudingWeights(const FittedCloud& cloud, FunctionRef<void(double)> done);
 
 }  // namespace stellate::core

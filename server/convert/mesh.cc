@@ -142,6 +142,7 @@ void ToProto(const core::Certificate& c, int k, v1::Certificate* out) {
   out->set_components(c.components);
   out->set_euler_characteristic(c.euler_characteristic);
   out->set_orientable(c.orientable);
+  out->mutable_betti()->Add(c.betti.begin(), c.betti.end());
   out->set_level(ToProto(c.level));
   out->set_declared_reach(c.declared_reach);
   out->set_reach_refuted(c.reach_refuted);

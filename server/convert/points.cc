@@ -28,6 +28,22 @@ Status CheckTimesAlone(const v1::MeshLimits& limits) {
                "leave the others out");
 }
 
+Status ReadWeights(const v1::Reconstruction& spec, core::ReconstructionSpecification* out) {
+  switch (spec.weights()) {
+    case v1::WEIGHTING_UNSPECIFIED:
+    case v1::WEIGHTING_AUTO:
+      out->weights = core::Weighting::kAuto;
+      return Status::Ok();
+    case v1::WEIGHTING_ONLY:
+      out->weights = core::Weighting::kOnly;
+      return Status::Ok();
+    default:
+      return Unfit("weights",
+                   Message("weights is ", static_cast<int>(spec.weights()),
+                           ", which is no Weighting that this server knows: leave it out"));
+  }
+}
+
 // The wire's rows are the columns of a matrix.
 core::Expected<Eigen::MatrixXd> Rows(const v1::Array& array,
                                      std::initializer_list<std::uint64_t> shape, const char* name) {
@@ -49,7 +65,9 @@ Allowed<MeshRequest> FromProto(const v1::Reconstruction& spec, const Config& con
   if (spec.has_declared_reach()) points.spec.reach = spec.declared_reach();
   if (spec.has_drop()) points.spec.drop = spec.drop();
   points.spec.closed = !spec.open();
-  Refused refused = ReadCommon(spec, config, &request);
+  points.spec.steiner = spec.steiner();
+  Refused refused = ReadWeights(spec, &points.spec);
+  if (refused.ok()) refused = ReadCommon(spec, config, &request);
   if (!refused.ok()) return tl::unexpected(std::move(refused));
   points.spec.dimension = request.spec.dimension;
   points.spec.ambient_dimension = request.spec.ambient_dimension;
@@ -77,11 +95,15 @@ void ToProto(const PointsRequest& points, v1::MeshSpec* spec) {
   if (points.spec.reach) out->set_declared_reach(*points.spec.reach);
   out->set_drop(points.spec.drop);
   out->set_open(!points.spec.closed);
+  out->set_weights(points.spec.weights == core::Weighting::kOnly ? v1::WEIGHTING_ONLY
+                                                                 : v1::WEIGHTING_AUTO);
+  out->set_steiner(points.spec.steiner);
   out->set_label(spec->label());
   spec->set_dimension(out->dimension());
   spec->set_ambient_dimension(out->ambient_dimension());
   if (points.spec.reach) spec->set_declared_reach(*points.spec.reach);
-  spec->mutable_limits()->set_max_vertices(points.points);
+  spec->mutable_limits()->set_max_vertices(points.points +
+                                           core::MostAdded(points.spec, points.points));
 }
 
 core::Expected<PointsPart> FromProto(const v1::Points& points, const PointsRequest& request) {

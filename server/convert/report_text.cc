@@ -80,6 +80,13 @@ std::string_view Ending(v1::Termination termination) {
   }
 }
 
+// ", Betti numbers 1 0 0 0"
+std::string BettiNumbers(const google::protobuf::RepeatedField<std::int64_t>& betti) {
+  std::string numbers;
+  for (const std::int64_t number : betti) numbers += ' ' + std::to_string(number);
+  return numbers.empty() ? ", Betti numbers not computed" : ", Betti numbers" + numbers;
+}
+
 // The mark in capitals, then the verdict without the words that say the same.
 std::string Judgement(const v1::Certificate& c) {
   std::string_view mark = "NOT CERTIFIED";
@@ -99,7 +106,8 @@ void AddTopology(const v1::Certificate& c, bool of_points, Entries* entries) {
   entries->Add("topology", Message(c.components() == 1 ? "1 component"
                                                        : Grouped(c.components()) + " components",
                                    ", Euler characteristic ", c.euler_characteristic(),
-                                   c.orientable() ? ", orientable" : ", not orientable"));
+                                   c.orientable() ? ", orientable" : ", not orientable",
+                                   c.betti_size() > 0 ? BettiNumbers(c.betti()) : ""));
   const bool ends = c.faces_size() > 0;  // the manifold, at its boundary
   const std::string closed = !c.closed()
                                  ? Message("not closed (", Grouped(c.bad_faces()), " bad faces)")
@@ -195,13 +203,6 @@ void AddProtection(const v1::Protection& p, Entries* entries) {
       "stability",
       Message(stable, "thickness at least ", Digits(p.thickness_bound(), 3),
               p.is_delaunay() ? "; intrinsic, restricted and tangential Delaunay: proved" : ""));
-}
-
-// ", Betti numbers 1 0 0 0"
-std::string BettiNumbers(const google::protobuf::RepeatedField<std::int64_t>& betti) {
-  std::string numbers;
-  for (const std::int64_t number : betti) numbers += ' ' + std::to_string(number);
-  return numbers.empty() ? ", Betti numbers not computed" : ", Betti numbers" + numbers;
 }
 
 // "2 (grain)", or the label alone where it has no name.

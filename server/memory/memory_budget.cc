@@ -16,7 +16,7 @@ constexpr std::uint64_t kStarBytes[] = {0, 420, 330, 4300, 25'000, 150'000};
 static_assert(std::size(kStarBytes) == core::kMaxDimension + 1);
 constexpr std::uint64_t kEmptyMeshBytes = std::uint64_t{1} << 16;  // one with nothing in it
 constexpr std::uint64_t kReconstructedBytes = 500;  // of a point, beside it and its tangent basis
-// Besides, where weights are sought by which tetrahedra can be proved: neighbours, stars, slivers.
+// Besides, where weights are sought of all points: neighbours, stars, slivers.
 constexpr std::uint64_t kWeighedBytes = 4000;
 constexpr std::uint64_t kFinishedBytes = std::uint64_t{1} << 14;  // without history and seeds
 constexpr std::uint64_t kCallBytes = std::uint64_t{1} << 15;      // that sends nothing
@@ -49,8 +49,11 @@ std::uint64_t EstimateReconstructionBytes(const core::ReconstructionSpecificatio
                                           std::uint64_t points) {
   const auto d = static_cast<std::uint64_t>(spec.ambient_dimension);
   const auto k = static_cast<std::uint64_t>(spec.dimension);
-  const std::uint64_t weighed = k == 3 && spec.reach ? kWeighedBytes : 0;
-  return kEmptyMeshBytes + points * (sizeof(double) * d * (k + 1) + kReconstructedBytes + weighed);
+  const bool weighs = spec.weights == core::Weighting::kOnly || (k == 3 && spec.reach);
+  const std::uint64_t weighed = weighs ? kWeighedBytes : 0;
+  const std::uint64_t vertices = points + core::MostAdded(spec, points);
+  return kEmptyMeshBytes +
+         vertices * (sizeof(double) * d * (k + 1) + kReconstructedBytes + weighed);
 }
 
 std::uint64_t EstimateFinishedBytes(const core::Specification& spec) {

@@ -84,6 +84,8 @@ Status PointRounds::Reconstruct(core::MeshDelta* delta) {
   auto made = core::Reconstruct(request_.spec, cloud_, watch_);
   if (!made) return std::move(made.error());
   cloud_ = {};
+  delta->points = std::move(made->added);
+  progress_.vertices += static_cast<std::uint64_t>(delta->points.cols());
   delta->added = std::move(made->simplices);
   for (const core::Place place : made->places) {
     places_->codes.push_back(static_cast<std::uint8_t>(place));

@@ -72,6 +72,8 @@ void LayOutPoints(Archive& archive, Value& points) {
   archive.Number(spec.drop);
   archive.Maybe(spec.reach);
   archive.Number(spec.threads);
+  archive.Number(spec.weights);
+  archive.Number(spec.steiner);
 }
 
 std::int64_t ToNumber(SystemTime time) {

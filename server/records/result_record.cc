@@ -198,6 +198,7 @@ std::string EncodeResult(const SessionResult& result, std::uint64_t parts) {
   writer.Number(result.report.certificate.only_too_coarse);
   LayOutReconstruction(writer, result.report.reconstruction);
   LayOutProtection(writer, result.report.certificate.protection);
+  writer.Ids(result.report.certificate.betti);
   return writer.Take();
 }
 
@@ -223,6 +224,7 @@ std::optional<SessionResult> DecodeResult(std::string_view record, std::uint64_t
   if (!reader.Complete()) reader.Number(result.report.certificate.only_too_coarse);
   if (!reader.Complete()) LayOutReconstruction(reader, result.report.reconstruction);
   if (!reader.Complete()) LayOutProtection(reader, result.report.certificate.protection);
+  if (!reader.Complete()) reader.Ids(result.report.certificate.betti);
   if (!reader.Complete()) return std::nullopt;
   return result;
 }

@@ -189,8 +189,10 @@ class UploadStream final : public ServerStream<v1::PointsChunk, v1::ReconstructR
   Step Next() override {
     if (!reply_) return Step::kWait;
     ToProto(*session(), response()->mutable_mesh());
+    // Vertices may be more: those that the run added.
     response()->set_rows(
-        std::max(session()->intake()->rows(), response()->mesh().progress().vertices()));
+        std::min(session()->request().points->points,
+                 std::max(session()->intake()->rows(), response()->mesh().progress().vertices())));
     return Step::kSendLast;
   }
 

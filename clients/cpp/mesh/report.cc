@@ -204,6 +204,7 @@ std::string CertificateJson(const Certificate& c) {
   json.Add("volume", c.volume);
   json.Add("only_too_coarse", c.only_too_coarse);
   json.Raw("protection", ProtectionJson(c.protection));
+  json.Raw("betti", NumbersJson(c.betti));
   return json.Take();
 }
 

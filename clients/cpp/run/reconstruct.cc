@@ -95,6 +95,8 @@ class Upload {
     if (options_.reach) spec->set_declared_reach(*options_.reach);
     spec->set_drop(options_.drop);
     spec->set_open(!options_.closed);
+    if (options_.weights == Weighting::kOnly) spec->set_weights(v1::WEIGHTING_ONLY);
+    spec->set_steiner(options_.steiner);
     spec->set_label(options_.label);
     v1::ReconstructReply reply;
     const grpc::Status status = Send({chunk}, &reply, kCallTime);

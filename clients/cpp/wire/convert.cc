@@ -334,6 +334,7 @@ Report ReportOf(const v1::Mesh& mesh) {
   out.components = c.components();
   out.euler_characteristic = c.euler_characteristic();
   out.orientable = c.orientable();
+  out.betti.assign(c.betti().begin(), c.betti().end());
   out.level = v1::CertificateLevel_IsValid(c.level()) ? static_cast<CertificateLevel>(c.level())
                                                       : CertificateLevel::kUnknown;
   out.declared_reach = c.declared_reach();

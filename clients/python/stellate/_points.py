@@ -12,7 +12,9 @@ from ._rows import unmasked
 from .errors import InvalidArgument
 
 Noise = Union[float, Literal["auto"], None]
+Weights = Literal["auto", "only"]
 
+_WEIGHTINGS = {"auto": pb.WEIGHTING_AUTO, "only": pb.WEIGHTING_ONLY}
 _ORTHONORMAL = 1e-9  # what differs by more is made so; the server allows 1e-6
 _DEPENDENT = 1e-6  # of the longest column: what is left of one that has nothing of its own
 
@@ -41,6 +43,8 @@ class CheckedPoints:
         closed: bool,
         limits: dict[str, Any],
         label: str | None,
+        weights: Weights = "auto",
+        steiner: bool = False,
     ) -> None:
         """Raises: InvalidArgument, naming the row where it is one."""
         if isinstance(dimension, bool) or not isinstance(dimension, numbers.Integral):
@@ -66,6 +70,10 @@ class CheckedPoints:
         if reach is not None:
             _set(self.spec, "declared_reach", reach)
         _set(self.spec, "drop", drop)
+        if weights not in _WEIGHTINGS:
+            raise InvalidArgument(f"weights has to be 'auto' or 'only', and is {weights!r}")
+        self.spec.weights = _WEIGHTINGS[weights]
+        _set(self.spec, "steiner", steiner)
         for name, value in limits.items():
             if value is not None:
                 _set(self.spec.limits, name, value)

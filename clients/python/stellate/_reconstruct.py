@@ -16,7 +16,7 @@ from ._info import MeshInfo, unless_failed
 from ._interrupt import Interrupts
 from ._mesh import FinishedMesh
 from ._notebook import calm_output
-from ._points import CheckedPoints, Noise
+from ._points import CheckedPoints, Noise, Weights
 from ._upload import Upload
 from .client import Client
 from .errors import (
@@ -46,6 +46,8 @@ def reconstruct(
     server: str | Server | Client | None = None,
     on_progress: OnProgress | None = None,
     *,
+    weights: Weights = "auto",
+    steiner: bool = False,
     credentials: Credentials | None = None,
     require_certified: bool = False,
     save: Path | Sequence[Path] = (),
@@ -60,7 +62,7 @@ def reconstruct(
 
     Args:
       points: (n, d) finite numbers, an array or lists. Row i is vertex i of the mesh: labels and other
-        data of the points stay attached. None is moved.
+        data of the points stay attached. None is moved, and none added unless by `steiner`.
       dimension: k of the manifold, 1 to 3, below d.
       tangents: (n, d, k), of each point a basis of the tangent space, its columns; they need not be
         orthonormal. None: they are estimated from the points.
@@ -74,6 +76,11 @@ def reconstruct(
       server: as for stellate.mesh; None starts one for this mesh.
       on_progress: called in this thread with a stellate.Progress now and then. If it raises, the mesh
         is cancelled.
+      weights: "auto": stars that disagree are made to agree by tilings, and by weights of points where
+        these do not do. "only": by weights alone, of any points: the mesh is their weighted tangential
+        Delaunay complex, and is refused where stars disagree; `drop` and `steiner` are not used.
+      steiner: vertices may be added where neither tilings nor weights make stars agree, nor leaving
+        points out: at most one for each hundred points, or 16. They come after the points.
       credentials: a stellate.Credentials for `server`, where it wants TLS or a token.
       require_certified: a mesh that is not certified is an error, NotCertified.
       save: a file or several to write the mesh to, as for stellate.mesh.
@@ -89,6 +96,7 @@ def reconstruct(
         DROPPED   was left out
         TILED     stars disagreed around it, and a tiling of the place agrees
         WEIGHTED  has a weight, by which stars agree
+        ADDED     is none of the points
 
       and of what is not resolved EDGE, SHEETS, NOISE, SPARSE, CLOSE or DISAGREE, the first that applies;
       `report.reconstruction` has their numbers, and what each is and what helps. `smoothed` are the
@@ -101,7 +109,7 @@ def reconstruct(
     """
     limits = {"worker_wait_seconds": worker_wait_seconds, "answer_seconds": answer_seconds}
     checked = CheckedPoints(
-        points, dimension, tangents, noise, reach, drop, closed, limits, label
+        points, dimension, tangents, noise, reach, drop, closed, limits, label, weights, steiner
     )  # fmt: skip
     files = [save] if isinstance(save, (str, os.PathLike)) else list(save)
     for file in files:

@@ -256,6 +256,9 @@ class Certificate:
     volume: float = 0.0
     only_too_coarse: bool = False  # refused for its size alone: nothing seen contradicts it
     protection: Protection | None = None  # where `protection` was asked for
+    # Over Z/2, from dimension 0 on, of a closed manifold of dimension 3 or less with at most a million
+    # simplices; else empty: see Mesh.betti.
+    betti: tuple[int, ...] = ()
 
 
 @dataclasses.dataclass(frozen=True)
@@ -375,6 +378,7 @@ class Report:
         certificate["regions"] = tuple(map(RegionCertificate.from_fields, regions))
         if certificate.get("sharpest"):
             certificate["sharpest"] = WallAngle.from_fields(certificate["sharpest"])
+        certificate["betti"] = tuple(certificate.get("betti", ()))
         if certificate.get("protection"):
             certificate["protection"] = Protection.from_fields(certificate["protection"])
         told = dict(fields.get("reconstruction") or {})  # checkpoints of earlier versions lack it
@@ -513,6 +517,7 @@ def _certificate(message: pb.Certificate) -> Certificate:
         protection=(
             Protection.from_wire(message.protection) if message.HasField("protection") else None
         ),
+        betti=tuple(message.betti),
     )
 
 

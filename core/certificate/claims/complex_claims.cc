@@ -12,6 +12,7 @@
 #include "core/base/message.h"
 #include "core/base/parallel.h"
 #include "core/certificate/claims/boundary_claims.h"
+#include "core/certificate/complex/closed_betti.h"
 #include "core/certificate/complex/links.h"
 
 namespace stellate::core {
@@ -224,6 +225,10 @@ std::optional<StarGeometry> JudgeComplex(Examination& x) {
   x.shape = std::move(stars.shape);
   JudgeSize(x);
   if (closed) BoundaryClaims(x).JudgeVolume();
+  Certificate& c = x.certificate;
+  if (!closed && c.closed && c.links_are_spheres)
+    c.betti = ClosedBettiNumbers(x.list(), static_cast<std::int64_t>(c.components),
+                                 c.euler_characteristic);
   x.longest_edge = std::move(stars.longest_edge);
   return stars;
 }

@@ -53,6 +53,7 @@ TEST(ReportJson, IsThatOfAllClients) {
   report.certificate.estimated_reach = std::numeric_limits<double>::infinity();
   report.certificate.components = 1;
   report.certificate.euler_characteristic = -8;
+  report.certificate.betti = {1, 10};
   EXPECT_EQ(
       ToJson(report),
       R"({"termination": "ORACLE_FAILED", "failure": {"reason": "ORACLE_RAISED", "message": )"
@@ -73,7 +74,7 @@ TEST(ReportJson, IsThatOfAllClients) {
       R"("inconsistent": [], "fibres": [0, 3]}, "boundary_simplices": 0, )"
       R"("boundary_components": 0, "boundary_euler_characteristic": 0, "faces": [], )"
       R"("sharpest": null, "regions": [], "pinched_vertices": 0, "volume": 0, "only_too_coarse": false, )"
-      R"("protection": null}, )"
+      R"("protection": null, "betti": [1, 10]}, )"
       R"("elapsed_seconds": 0.5, )"
       R"("version": "0.2.0"})");
   report.epsilon = 0;

@@ -56,3 +56,12 @@ def rotations(rng: np.random.Generator, count: int = 12_000, spacing: float = 0.
         [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
     ]
     return thinned(np.array(rows).reshape(9, count).T, spacing)
+
+
+def random_torus(count: int) -> np.ndarray:
+    """Independent points of a torus of radii 1 and 0.4, of an even density; always the same."""
+    turns = np.random.default_rng(1).uniform(0, 2 * np.pi, (4 * count, 2))
+    keep = np.random.default_rng(2).uniform(0, 1.4, 4 * count) < 1 + 0.4 * np.cos(turns[:, 1])
+    u, v = turns[keep][:count].T
+    wide = 1 + 0.4 * np.cos(v)
+    return np.stack([wide * np.cos(u), wide * np.sin(u), 0.4 * np.sin(v)], axis=1)

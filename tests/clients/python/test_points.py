@@ -5,6 +5,7 @@ import sys
 import numpy as np
 import pytest
 import stellate
+from stellate._generated import mesh_pb2 as pb
 from stellate._points import CheckedPoints
 
 
@@ -41,6 +42,17 @@ def test_a_dimension_is_a_whole_number(dimension):
 def test_numbers_are_numbers(name, value):
     with pytest.raises(stellate.InvalidArgument, match=name):
         checked([[0, 1], [2, 3]], **{name: value})
+
+
+def test_options_of_weights_and_of_added_points():
+    points = [[0, 1], [2, 3]]
+    assert not checked(points).spec.steiner
+    spec = CheckedPoints(
+        points, 1, None, "auto", None, 0, True, {}, None, weights="only", steiner=True
+    ).spec
+    assert spec.weights == pb.WEIGHTING_ONLY and spec.steiner
+    with pytest.raises(stellate.InvalidArgument, match="weights has to be 'auto' or 'only'"):
+        stellate.reconstruct(points, 1, weights="none")
 
 
 def test_tangents_are_made_orthonormal_or_refused():

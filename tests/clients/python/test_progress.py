@@ -194,7 +194,7 @@ AS_JSON = (
     '"violations": {"faces": [[1, 2], [1, 5]], "links": [], "stars": [7], "inconsistent": [], '
     '"fibres": [0, 3]}, "boundary_simplices": 0, "boundary_components": 0, '
     '"boundary_euler_characteristic": 0, "faces": [], "sharpest": null, "regions": [], '
-    '"pinched_vertices": 0, "volume": 0, "only_too_coarse": false, "protection": null}, "elapsed_seconds": 0.5, '
+    '"pinched_vertices": 0, "volume": 0, "only_too_coarse": false, "protection": null, "betti": [1, 10]}, "elapsed_seconds": 0.5, '
     f'"version": "{stellate.__version__}"}}'
 )
 
@@ -208,6 +208,7 @@ def test_a_report_is_the_json_of_all_clients():
     certificate.warnings.extend(["coarse", "dear"])
     certificate.max_circumradius, certificate.estimated_reach = 0.25, float("inf")
     certificate.components, certificate.euler_characteristic = 1, -8
+    certificate.betti.extend((1, 10))
     for kind, ids in {"faces": [[1, 2], [1, 5]], "stars": [7], "fibres": [0, 3]}.items():
         array = np.array(ids, dtype="<u4")
         wire = getattr(certificate.violations, kind)

@@ -120,6 +120,44 @@ def test_a_part_of_a_torus_with_its_boundary(server, torus):
     assert len(topology.rim(mesh.simplices)) > 10
 
 
+def test_weights_alone(server, torus):
+    mesh = stellate.reconstruct(torus, 2, weights="only", server=server)
+    assert mesh.certified, mesh.report
+    assert set(mesh.places) == {"OK", "WEIGHTED"}
+    assert mesh.report.reconstruction.tiles == 0
+    assert mesh.report.certificate.betti == mesh.betti() == (1, 2, 1)
+    coarse = stellate.reconstruct(samples.random_torus(300), 2, weights="only", server=server)
+    assert not coarse.certified and "No weights were found" in coarse.report.certificate.verdict
+
+
+def test_points_are_added_where_nothing_else_helps(server, mortal, tmp_path):  # noqa: F811
+    points = samples.random_torus(300)
+    plain = stellate.reconstruct(points, 2, drop=0, server=server)
+    assert plain.report.reconstruction.unfilled_vertices > 0
+    mesh = stellate.reconstruct(points, 2, drop=0, steiner=True, server=server)
+    n = len(points)
+    assert len(mesh.points) > n and len(mesh.places) == len(mesh.points)
+    assert mesh.points[:n].tobytes() == points.tobytes()
+    assert set(mesh.places[n:]) == {"ADDED"} and "ADDED" not in mesh.places[:n]
+    assert mesh.report.counts.vertices == len(mesh.points)
+    assert mesh.report.reconstruction.places["ADDED"] == len(mesh.points) - n
+    topology.assert_closed_manifold(mesh, 0, [1, 2, 1])
+    assert any("none of the points" in warning for warning in mesh.report.warnings)
+    checked = declared(points, drop=0, steiner=True)
+    with stellate.Client(mortal.address) as client:
+        info = client.declare_points(checked)
+        client.upload(info.name, checked).run()
+        stellate.download(info.name, server=client, unfinished="wait")
+        mortal.kill()
+        mortal.start()
+        again = stellate.download(info.name, server=client, unfinished="wait")
+        # A client that lost the reply has sent the points alone.
+        talk = Talk(client)
+        assert talk.say(pb.PointsChunk(mesh=info.name), end(points)).rows == n
+        client.delete(info.name)
+    same(mesh, again)
+
+
 def upload(client, checked, rows):
     info = client.declare_points(checked)
     try:
@@ -288,6 +326,7 @@ def test_hostile_specifications_are_refused_before_a_point(talk, torus):
         ("noise", -1.0),
         ("declared_reach", 0.0),
         ("label", "x" * 200),
+        ("weights", 9),
     ]:
         error = refused(**{field: value})
         assert error.code() is grpc.StatusCode.INVALID_ARGUMENT, (field, value, error)

@@ -49,6 +49,19 @@ def test_standard_input_and_more_columns(torus, tmp_path):
     assert json.loads(done.stdout)["certificate"]["certified"]
 
 
+def test_columns_of_a_scan(torus, tmp_path):
+    rows = "\n".join(f"12:00,{x:.17g},{y:.17g},{z:.17g},7" for x, y, z in torus)
+    (tmp_path / "scan.csv").write_text(f"time,x,y,z,intensity\n{rows}\n")
+    asked = reconstruct("scan.csv", "-k", 2, cwd=tmp_path)
+    assert asked.returncode == 2 and "--columns x,y,z" in asked.stderr
+    done = reconstruct(
+        "scan.csv", "-k", 2, "--columns", "x,y,z", "--weights", "only", "-o", "t.txt", cwd=tmp_path
+    )
+    assert done.returncode == 0, done.stderr
+    assert "Betti numbers 1 2 1" in done.stdout
+    assert stellate.load_txt(tmp_path / "t.txt").points.tobytes() == torus.tobytes()
+
+
 def test_what_is_not_certified_is_written_and_exits_with_1(torus, tmp_path):
     np.save(tmp_path / "half.npy", torus[torus[:, 0] > 0])
     done = reconstruct("half.npy", "-k", 2, "-o", "half.txt", cwd=tmp_path)
@@ -70,6 +83,9 @@ def test_what_is_not_certified_is_written_and_exits_with_1(torus, tmp_path):
         (["-", "-k", "2", "--ambient", "4"], "1 2 3\n", "4 are asked for"),
         (["-", "-k", "2", "-o", "a.stl"], "1 2 3 4\n", "stl"),
         (["-", "-k", "1", "--drop", "2"], "1 2\n" * 9, "drop is 2"),
+        (["-", "-k", "1", "--weights", "no"], "1 2\n" * 9, "--weights"),
+        (["-", "-k", "1", "--columns", "a,b"], "x y\n1 2\n", "no column 'a'"),
+        (["-", "-k", "1", "--columns", "1", "--ambient", "2"], "1 2\n", "excludes"),
     ],
 )
 def test_mistakes_are_named_and_exit_with_2(arguments, given, words, tmp_path):
@@ -80,5 +96,16 @@ def test_mistakes_are_named_and_exit_with_2(arguments, given, words, tmp_path):
 
 def test_help_says_what_there_is(tmp_path):
     said = reconstruct("--help", cwd=tmp_path).stdout
-    for option in ("--ambient", "--noise", "--reach", "--drop", "--open", "--server", "--report"):
+    for option in (
+        "--ambient",
+        "--columns",
+        "--noise",
+        "--reach",
+        "--weights",
+        "--steiner",
+        "--drop",
+        "--open",
+        "--server",
+        "--report",
+    ):
         assert option in said

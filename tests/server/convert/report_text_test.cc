@@ -55,6 +55,13 @@ TEST(ReportText, IsAsAllClientsShowIt) {
 )");
 }
 
+TEST(ReportText, NamesBettiNumbersWhereTheyAreKnown) {
+  v1::Report report = Good();
+  for (const std::int64_t number : {1, 10, 1}) report.mutable_certificate()->add_betti(number);
+  EXPECT_TRUE(Says(ReportText(report), "not orientable, Betti numbers 1 10 1\n"))
+      << ReportText(report);
+}
+
 TEST(ReportText, SaysOfPointsWhatWasMeasuredAlone) {
   v1::Report report = Good();
   report.mutable_reconstruction()->set_spacing(0.5);

@@ -48,6 +48,7 @@ TEST(ResultRecord, HoldsFacesAndWhereWallsMeetMostSharply) {
   certificate.regions = {{4, 9, 1, 1, 0.25, 12, {1, 0, 0}}};
   certificate.pinched_vertices = 3;
   certificate.volume = 0.25;
+  certificate.betti = {1, 4, 1};
   certificate.sharpest = core::WallAngle{core::WallSet{5}, 27.5, Eigen::Vector3d(1, 2, 3)};
   std::uint64_t parts = 0;
   const auto read = DecodeResult(EncodeResult(result, 2), &parts);
@@ -62,6 +63,7 @@ TEST(ResultRecord, HoldsFacesAndWhereWallsMeetMostSharply) {
   EXPECT_EQ(read->report.certificate.pinched_vertices, 3u);
   EXPECT_EQ(read->report.certificate.regions[0].betti, (std::vector<std::int64_t>{1, 0, 0}));
   EXPECT_EQ(read->report.certificate.volume, 0.25);
+  EXPECT_EQ(read->report.certificate.betti, (std::vector<std::int64_t>{1, 4, 1}));
   ASSERT_TRUE(read->report.certificate.sharpest);
   EXPECT_EQ(read->report.certificate.sharpest->walls, core::WallSet{5});
   EXPECT_EQ(read->report.certificate.sharpest->degrees, 27.5);
@@ -73,6 +75,7 @@ TEST(ResultRecord, KeepsWhatBecameOfPoints) {
   core::ReconstructionCounts& counts = result.report.reconstruction.emplace();
   counts.places[0] = 90;
   counts.places[10] = 7;
+  counts.places[11] = 2;
   counts.noise_ratio = 0.25;
   counts.smoothed = true;
   counts.looks[0] = 0.5;
@@ -83,6 +86,7 @@ TEST(ResultRecord, KeepsWhatBecameOfPoints) {
   const core::ReconstructionCounts& back = *read->report.reconstruction;
   EXPECT_EQ(back.places[0], 90u);
   EXPECT_EQ(back.places[10], 7u);
+  EXPECT_EQ(back.places[11], 2u);
   EXPECT_EQ(back.noise_ratio, 0.25);
   EXPECT_TRUE(back.smoothed);
   EXPECT_EQ(back.looks[0], 0.5);
@@ -128,7 +132,7 @@ TEST(ResultRecord, EarlierOnesAreRead) {
     EXPECT_EQ(read->report.certificate.violations.stars.empty(), whole.size() <= 2);
     EXPECT_EQ(read->report.certificate.only_too_coarse, whole.size() >= 5);
   }
-  ASSERT_EQ(whole.size(), 7u);
+  ASSERT_EQ(whole.size(), 8u);
   EXPECT_EQ(whole.back(), record.size());
 }
 

@@ -12,6 +12,12 @@
 
 namespace stellate {
 
+// How stars of points that disagree are made to agree.
+enum class Weighting {
+  kAuto,  // by tilings, and by weights of points where these do not do
+  kOnly,  // by weights of points alone: the mesh is the weighted tangential Delaunay complex
+};
+
 // What points are, and how they are to become a mesh.
 struct ReconstructOptions {
   int dimension = 0;  // k of the manifold, 1 to 3; required
@@ -23,6 +29,10 @@ struct ReconstructOptions {
   std::optional<double> reach;
   double drop = 0.001;  // the share of the points that may be left out
   bool closed = true;   // false: it may have a boundary, and the mesh ends where the points end
+  Weighting weights = Weighting::kAuto;
+  // Whether vertices may be added, after the points, where stars disagree and nothing else helps:
+  // at most one for each hundred points, or 16.
+  bool steiner = false;
 
   Connection connection;  // without a server: a private one, as of MeshOptions
   std::function<void(const Progress&)> on_progress;  // called on the calling thread
@@ -30,9 +40,10 @@ struct ReconstructOptions {
   std::string label;                                 // shown in the server's lists and logs
 };
 
-// Makes a mesh of points on a manifold, or near it, d x n. They are its vertices, by their columns;
-// Report::reconstruction says what became of them. `tangents`, (d k) x n, where they are known: of
-// each point k orthonormal vectors, entry i*k + a being coordinate i of vector a.
+// Makes a mesh of points on a manifold, or near it, d x n. They are its vertices, by their columns,
+// and its first ones; Report::reconstruction says what became of them. `tangents`, (d k) x n, where
+// they are known: of each point k orthonormal vectors, entry i*k + a being coordinate i of vector
+// a.
 //
 //   const auto mesh = stellate::Reconstruct(points, {.dimension = 2});
 //

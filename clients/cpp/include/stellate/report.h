@@ -178,6 +178,9 @@ struct Certificate {
   bool only_too_coarse = false;
 
   std::optional<Protection> protection;  // where MeshOptions::protection asks for it
+  // Over Z/2, from dimension 0 on, of a closed manifold of dimension 3 or less with at most a
+  // million simplices; else empty.
+  std::vector<std::int64_t> betti;
 };
 
 // What a reconstruction found of its points. Lengths are in the coordinates' unit.
