@@ -32,7 +32,6 @@ namespace {
 using namespace stellate::server;  // NOLINT: this file is the program
 
 constexpr int kExitUsage = 2;
-constexpr int kExitLost = 1;  // another server has the meshes
 constexpr auto kHealthLimit = std::chrono::seconds(5);
 
 // SIGHUP has something to say only where there are files to read again; elsewhere it ends the
@@ -88,7 +87,7 @@ int RunCopy(const Flags& flags) {
   const auto open = [&flags](const std::string& setting) {
     const std::chrono::duration<double> patience(flags.config.database_patience_seconds);
     return OpenDatabase(
-        {setting, "that copies", 0, std::chrono::duration_cast<Clock::duration>(patience), {}},
+        {setting, 0, std::chrono::duration_cast<Clock::duration>(patience), {}, /*alone=*/true},
         [] { return false; });
   };
   const auto done = CopyMeshes(flags.copy_meshes[0], flags.copy_meshes[1], open);
@@ -144,8 +143,8 @@ void Reload(Server* server, const Flags& flags, int argc, const char* const* arg
 }
 
 // Returns when it is time to stop. kAtOnce: nobody is left to wait for.
-enum class Why { kTold, kAtOnce, kLost };
-Why ServeUntilTold(Server* server, const sigset_t& signals, bool with_parent, pid_t parent,
+enum class Why { kTold, kAtOnce };
+Why ServeUntilTold(const sigset_t& signals, bool with_parent, pid_t parent,
                    const std::function<void()>& reload) {
   while (true) {
     const int signal = WaitForSignal(signals, 250);
@@ -155,7 +154,6 @@ Why ServeUntilTold(Server* server, const sigset_t& signals, bool with_parent, pi
       Log(LogLevel::kInfo, {}, "stopping", stellate::server::LogFields().Add("signal", signal));
       return Why::kTold;
     }
-    if (server->HasLostItsMeshes()) return Why::kLost;
     // Polled, as PR_SET_PDEATHSIG would fire when the parent's *thread* ends.
     if (with_parent && getppid() != parent) {
       Log(LogLevel::kInfo, {}, "the parent process is gone: stopping");
@@ -198,7 +196,7 @@ int main(int argc, char** argv) {
 
   const auto reload = [&, &flags = flags] { Reload(server->get(), flags, argc, argv); };
   if (reload_is_due) reload();
-  const Why why = ServeUntilTold(server->get(), signals, flags.exit_with_parent, parent, reload);
+  const Why why = ServeUntilTold(signals, flags.exit_with_parent, parent, reload);
   const std::chrono::duration<double> drain(why == Why::kTold ? (*server)->config()->drain_seconds
                                                               : 0);
   const bool clean = (*server)->Stop(std::chrono::duration_cast<Clock::duration>(drain), [&] {
@@ -208,7 +206,6 @@ int main(int argc, char** argv) {
   if (!config.ready_file.empty()) unlink(config.ready_file.c_str());
   Log(LogLevel::kInfo, {}, "stopped");
   // A mesher in the middle of a round cannot be asked to leave: the process takes it along.
-  const int status = why == Why::kLost ? kExitLost : 0;  // who started it may start it again
-  if (!clean) std::_Exit(status);
-  return status;
+  if (!clean) std::_Exit(0);
+  return 0;
 }

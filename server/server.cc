@@ -5,17 +5,22 @@
 #include <grpcpp/grpcpp.h>
 #include <grpcpp/health_check_service_interface.h>
 #include <grpcpp/server_builder.h>
+#include <unistd.h>
 
+#include <array>
 #include <atomic>
 #include <condition_variable>
 #include <mutex>
 #include <string_view>
 #include <thread>
 
+#include "core/base/message.h"
 #include "server/base/log.h"
+#include "server/config/listen_address.h"
 #include "server/config/settings.h"
 #include "server/drain.h"
 #include "server/net/guarded_server.h"
+#include "server/net/tls.h"
 #include "server/postgres/database.h"
 #include "server/rpc/service.h"
 #include "stellate/v1/stellate.grpc.pb.h"
@@ -54,12 +59,22 @@ core::Expected<std::unique_ptr<Journal>> OpenRecords(const Config& config,
                                                      const std::function<bool()>& give_up) {
   const auto patience = std::chrono::duration_cast<Clock::duration>(
       std::chrono::duration<double>(config.database_patience_seconds));
-  auto records = OpenDatabase(
-      {config.database, config.listen, config.max_journal_bytes, patience, on_answer}, give_up);
+  auto records =
+      OpenDatabase({config.database, config.max_journal_bytes, patience, on_answer}, give_up);
   if (!records) return tl::unexpected(std::move(records.error()));
   const std::uint64_t share =
       config.owner_journal_bytes > 0 ? config.owner_journal_bytes : config.max_journal_bytes / 2;
   return Journal::Over(std::move(*records), {"", config.max_journal_bytes, share});
+}
+
+// What others dial of what a server listens on.
+std::string AsPeersDial(const std::string& listening) {
+  const auto address = ParseListenAddress(listening);
+  std::array<char, 256> name{};
+  if (!address || !address->IsEvery() || gethostname(name.data(), name.size() - 1) != 0) {
+    return listening;
+  }
+  return core::Message(name.data(), ":", address->port);
 }
 
 }  // namespace
@@ -75,9 +90,7 @@ class Server::Impl {
     if (address.empty() || state.metrics.port() != 0) return Status::Ok();
     return state.metrics.Listen(
         address, [this] { return state.store.All(); },
-        [this] {
-          return is_listening ? state.WhyNoNewMeshes() : "it waits for its database, or stands by";
-        });
+        [this] { return is_listening ? state.WhyNoNewMeshes() : "it waits for its database"; });
   }
 
   // Takes up the meshes of an earlier server.
@@ -93,7 +106,17 @@ class Server::Impl {
       ApplyServerPolicy(state, &options);
       state.store.Restore(std::move(options));
     }
+    Share();
     return Status::Ok();
+  }
+
+  // Where other servers have records in the same database.
+  void Share() {
+    Sharing* const sharing = state.journal->sharing();
+    if (sharing == nullptr) return;
+    sharing->LimitOwners(asked.owner_meshes);
+    state.authenticator->Trust({sharing->secret(), [sharing] { return sharing->number(); }});
+    state.router.Start(PeerCredentials(asked));
   }
 
   Status Listen() {
@@ -109,6 +132,8 @@ class Server::Impl {
          [this](const char* setting) { state.metrics.LimitReached(setting); }});
     if (!started) return std::move(started.error());
     server = std::move(*started);
+    state.router.Announce(asked.peer_address.empty() ? AsPeersDial(server->address())
+                                                     : asked.peer_address);
     return Status::Ok();
   }
 
@@ -121,7 +146,11 @@ class Server::Impl {
         state.authenticator->Reload();  // before the streams ask it
         state.streams.Tick(now);
         state.store.Sweep(now);
-        if (state.journal != nullptr) state.metrics.DatabaseAnswers(!state.journal->IsAway());
+        if (state.journal != nullptr) {
+          state.metrics.DatabaseAnswers(!state.journal->IsAway());
+          const Sharing* const sharing = state.journal->sharing();
+          if (sharing != nullptr) state.metrics.Share(sharing->Peers().size());
+        }
         LogLeftOut();
       }
     });
@@ -160,8 +189,7 @@ core::Expected<std::unique_ptr<Server>> Server::Start(const Config& config,
   if (!authenticator) return tl::unexpected(std::move(authenticator.error()));
   auto impl = std::make_unique<Impl>(config, std::move(factory));
   impl->state.authenticator = std::move(*authenticator);
-  // While this waits for the database, or stands by; unless the server that has it is on the same
-  // machine, and has the port.
+  // While this waits for the database.
   if (!config.database.empty()) impl->ListenForPrometheus();
   status = impl->OpenJournal(give_up);
   if (!status.ok()) return tl::unexpected(std::move(status));
@@ -180,11 +208,6 @@ core::Expected<std::unique_ptr<Server>> Server::Start(const Config& config,
 
 int Server::metrics_port() const { return impl_->state.metrics.port(); }
 
-bool Server::HasLostItsMeshes() const {
-  const ServerState& state = impl_->state;
-  return state.journal != nullptr && state.journal->IsLost();
-}
-
 void Server::ReloadFiles() {
   impl_->server->ReloadFiles();
   impl_->state.authenticator->Reload(/*force=*/true);
@@ -195,6 +218,10 @@ Status Server::Reload(const Config& next) {
   if (!status.ok()) return status;
   const Changes changes = TakeOver(next, &impl_->asked);
   impl_->state.Adopt(WithDefaults(impl_->asked));
+  const auto& journal = impl_->state.journal;
+  if (journal != nullptr && journal->sharing() != nullptr) {
+    journal->sharing()->LimitOwners(impl_->asked.owner_meshes);
+  }
   for (const std::string& change : changes.taken) {
     Log(LogLevel::kInfo, {}, "from now on " + change);
   }
@@ -218,6 +245,7 @@ bool Server::Stop(Clock::duration drain, const std::function<bool()>& hurry) {
 
   Drain(state, drain, hurry);
   state.streams.StopAll();
+  state.router.Refuse();
   impl.server->StopListening();
   // Streams end once what is on its way has been read; a client that does not read is cut off. gRPC
   // also waits for clients that have no call open and do not look at their connection.
@@ -231,9 +259,11 @@ bool Server::Stop(Clock::duration drain, const std::function<bool()>& hurry) {
   impl.ticker.join();
   LogLeftOut();
   state.metrics.StopListening();
-  return state.store.Stop(Clock::now() + kLastRound, [&state] {
+  const bool clean = state.store.Stop(Clock::now() + kLastRound, [&state] {
     if (state.journal != nullptr) state.journal->StopWaiting();
   });
+  state.router.Join();
+  return clean;
 }
 
 }  // namespace stellate::server

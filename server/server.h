@@ -14,7 +14,7 @@ namespace stellate::server {
 // A running server. Several may live in one process, each with its own address.
 class Server {
  public:
-  // Listens once this returns. Where another server has the database, this waits for that, and asks
+  // Listens once this returns. Where the database does not answer yet, this waits for it, and asks
   // `give_up` now and then. kInvalidArgument: the configuration; kFailedPrecondition: the address
   // is taken or cannot be bound, or the record cannot be opened; kCancelled: it gave up.
   static core::Expected<std::unique_ptr<Server>> Start(
@@ -26,9 +26,6 @@ class Server {
   const std::string& address() const { return address_; }
   // Where Prometheus is answered; 0: nowhere.
   int metrics_port() const;
-
-  // Another server has taken the database, and the meshes with it: stop.
-  bool HasLostItsMeshes() const;
 
   // Reads the token file, and those of TLS, again, as happens by itself within seconds of a change.
   void ReloadFiles();

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <utility>
 
+#include "server/auth/ticket.h"
 #include "server/convert/error_map.h"
 
 namespace stellate::server {
@@ -37,6 +38,13 @@ bool IsBearer(std::string_view value) {
          strncasecmp(value.data(), kScheme.data(), kScheme.size()) == 0;
 }
 
+// Empty: none, or several.
+std::string_view AuthorizationIn(const grpc::ServerContextBase& context) {
+  const auto [first, last] = context.client_metadata().equal_range(kHeader);
+  if (first == last || std::next(first) != last) return "";
+  return {first->second.data(), first->second.size()};
+}
+
 tl::expected<TokenDigest, grpc::Status> TokenIn(const grpc::ServerContextBase& context) {
   const auto [first, last] = context.client_metadata().equal_range(kHeader);
   if (first == last) {
@@ -64,26 +72,45 @@ core::Expected<std::unique_ptr<Authenticator>> Authenticator::Create(const Confi
 
 tl::expected<Identity, grpc::Status> Authenticator::Identify(
     const grpc::ServerContextBase& context) const {
+  if (const auto authorization = AuthorizationIn(context);
+      !peers_.secret.empty() && IsTicket(authorization)) {
+    return IdentifyPassedOn(authorization);
+  }
   if (tokens_ != nullptr) {
     const auto digest = TokenIn(context);
     if (!digest) return tl::unexpected(digest.error());
     auto holder = tokens_->HolderOf(*digest);
     if (!holder) return Unauthenticated("the token is not known to this server");
-    return Identity{std::move(holder->owner), *digest, holder->administrator};
+    return Identity{std::move(holder->owner), *digest, holder->administrator, false, ""};
   }
   if (!by_certificate_) return Identity{};
   std::string owner = OwnerIn(*context.auth_context());
   if (owner.empty()) return Unauthenticated("the client certificate names no owner");
-  return Identity{std::move(owner), std::nullopt, false};
+  return Identity{std::move(owner), std::nullopt, false, false, ""};
+}
+
+tl::expected<Identity, grpc::Status> Authenticator::IdentifyPassedOn(
+    std::string_view authorization) const {
+  auto ticket = ReadTicket(authorization, peers_.secret);
+  if (!ticket) return Unauthenticated("no server of this database signed the call");
+  if (ticket->server != peers_.number()) {
+    return tl::unexpected(Refusal(v1::ERROR_REASON_SHUTTING_DOWN,
+                                  "the call was meant for an earlier server: call again"));
+  }
+  return Identity{std::move(ticket->owner), std::nullopt, ticket->administrator, true,
+                  std::move(ticket->address)};
 }
 
 bool Authenticator::Knows(std::string_view authorization) const {
+  if (!peers_.secret.empty() && IsTicket(authorization)) {
+    return ReadTicket(authorization, peers_.secret).has_value();
+  }
   return tokens_ != nullptr && IsBearer(authorization) &&
          tokens_->HolderOf(Digest(authorization.substr(kScheme.size())));
 }
 
 bool Authenticator::StillHolds(const Identity& identity) const {
-  return tokens_ == nullptr ||
+  return tokens_ == nullptr || identity.is_passed_on ||  // the server that knows him sees to it
          (identity.token && tokens_->HolderOf(*identity.token) ==
                                 TokenHolder{identity.owner, identity.administrator});
 }

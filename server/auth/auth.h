@@ -2,11 +2,14 @@
 
 #include <grpcpp/server_context.h>
 
+#include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <tl/expected.hpp>
+#include <utility>
 
 #include "core/status.h"
 #include "server/auth/tokens.h"
@@ -19,6 +22,14 @@ struct Identity {
   std::string owner;  // empty: clients are not authenticated
   std::optional<TokenDigest> token;
   bool administrator = false;  // sees and ends the meshes of all owners
+  bool is_passed_on = false;   // by another server, which knows the caller
+  std::string address;         // then: where the call came from
+};
+
+// What servers know each other's calls by.
+struct PeerTrust {
+  std::string secret;
+  std::function<std::int64_t()> number;  // this server's, as calls to it name it
 };
 
 // Authenticates callers: by bearer token if there is a token file, else by the client certificate
@@ -26,6 +37,9 @@ struct Identity {
 class Authenticator {
  public:
   static core::Expected<std::unique_ptr<Authenticator>> Create(const Config& config);
+
+  // Before the first call: also takes calls that other servers pass on.
+  void Trust(PeerTrust peers) { peers_ = std::move(peers); }
 
   // UNAUTHENTICATED: no token, or none that is known. Neither is logged.
   tl::expected<Identity, grpc::Status> Identify(const grpc::ServerContextBase& context) const;
@@ -40,6 +54,9 @@ class Authenticator {
   void Reload(bool force = false);
 
  private:
+  tl::expected<Identity, grpc::Status> IdentifyPassedOn(std::string_view authorization) const;
+
+  PeerTrust peers_;  // empty: none
   std::unique_ptr<TokenFile> tokens_;
   bool by_certificate_ = false;
 };

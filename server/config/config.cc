@@ -56,6 +56,13 @@ Status Validate(const Config& config) {
     return Invalid(
         "--data-dir and --database both say where meshes are recorded: give one of them");
   }
+  if (!config.peer_address.empty()) {
+    const auto peer = ParseListenAddress(config.peer_address, "--peer-address");
+    if (!peer) return peer.error();
+    if (config.database.empty()) {
+      return Invalid("--peer-address is for servers that share a --database: give that too");
+    }
+  }
   return CheckRanges(config);
 }
 

@@ -18,6 +18,7 @@ struct Config {
   std::string ready_file;        // written with the address once the server listens
   std::string data_dir;          // of the journal; empty: meshes live in memory alone,
   std::string database;          // or in PostgreSQL: a URL, or a file that holds one
+  std::string peer_address;      // where other servers of the database reach it; empty: at listen
 
   std::string tls_certificate, tls_key;  // PEM files; empty: plain text
   std::string tls_client_ca;             // PEM file; clients need a certificate of this authority

@@ -24,6 +24,8 @@ bool ListenAddress::IsLoopback() const {
          (numbers && (ntohl(v4.s_addr) >> 24) == 127);
 }
 
+bool ListenAddress::IsEvery() const { return host == "0.0.0.0" || host == "::" || host == "*"; }
+
 std::string ListenAddress::Target() const {
   if (IsUnix()) return "unix:" + unix_path;
   const bool v6 = host.find(':') != std::string::npos;

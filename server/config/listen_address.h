@@ -14,6 +14,7 @@ struct ListenAddress {
 
   bool IsUnix() const { return !unix_path.empty(); }
   bool IsLoopback() const;     // reachable from this machine alone
+  bool IsEvery() const;        // all addresses of this machine
   std::string Target() const;  // as gRPC writes it
 };
 

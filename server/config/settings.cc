@@ -83,9 +83,12 @@ const std::vector<Setting>& Settings() {
        "memory alone"},
       {"", "--database", &Config::database,
        "Record meshes in PostgreSQL instead: a URL, postgresql://USER@HOST/NAME, or a file that "
-       "holds one, as it must where there is a password in it. One server has a database at a "
-       "time; "
-       "others stand by, and take over"},
+       "holds one, as it must where there is a password in it. Any number of servers may share a "
+       "database, and take over each other's meshes"},
+      {"", "--peer-address", &Config::peer_address,
+       "HOST:PORT at which the other servers of --database reach this one; empty: that of "
+       "--listen, "
+       "with this machine's name where it listens on all its addresses"},
 
       {kSafety, "--insecure-listen", &Config::insecure_listen,
        "Allow plain text on an address that other machines reach"},

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "core/base/message.h"
+#include "server/base/log.h"
 #include "server/journal/recorded_mesh.h"
 #include "server/records/journal_format.h"
 
@@ -106,7 +107,6 @@ std::optional<Refused> Journal::RefuseNewMesh(const std::string& owner, std::uin
 }
 
 std::string Journal::WhyNoNewMeshes() const {
-  if (IsLost()) return "another server has taken the records of the meshes";
   if (IsAway()) return "the database does not answer";
   const std::string& directory = options_.directory;
   if (!directory.empty() && access(directory.c_str(), W_OK | X_OK) != 0) {
@@ -142,6 +142,32 @@ bool Journal::Take(std::int64_t id, const StoredMesh& stored) {
   options.ports.journal = place;
   meshes_.push_back(std::move(options));
   return true;
+}
+
+std::vector<SessionOptions> Journal::Tend(const std::string& name) {
+  Tidings tidings;
+  const auto failure =
+      shared_->Do("that it takes up meshes", FairMutex::Place::kFirst,
+                  [&](Records*) { return shared_->sharing()->Tend(name, &tidings); });
+  if (failure) Log(LogLevel::kWarning, {}, failure->message);
+  if (!failure && name.empty()) shared_->CountElsewhere(std::move(tidings.owners_bytes));
+  for (const std::string& trouble : tidings.troubles) Log(LogLevel::kError, {}, trouble);
+  for (const auto& [id, mesh] : tidings.meshes) {
+    if (!Take(id, mesh)) {
+      Log(LogLevel::kError, {},
+          Message("mesh ", id, " of the database makes no sense, and is left as it is"));
+    }
+  }
+  return TakeMeshes();
+}
+
+std::optional<Whereabouts> Journal::Locate(const std::string& name) {
+  Whereabouts found;
+  const auto failure = shared_->Do("nothing", FairMutex::Place::kFirst, [&](Records*) {
+    return shared_->sharing()->Locate(name, &found);
+  });
+  if (failure) return std::nullopt;
+  return found;
 }
 
 Journal::~Journal() { shared_->StopThreads(); }

@@ -4,6 +4,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/status.h"
@@ -50,7 +51,7 @@ class Journal {
 
   // Returns the meshes that it had when it was opened, oldest first: the recorded part of
   // SessionOptions, and their journal.
-  std::vector<SessionOptions> TakeMeshes() { return std::move(meshes_); }
+  std::vector<SessionOptions> TakeMeshes() { return std::exchange(meshes_, {}); }
 
   // For a new mesh.
   std::shared_ptr<SessionJournal> NewMesh();
@@ -63,8 +64,14 @@ class Journal {
 
   // Where the records are away, writes of meshes fail from now on, in place of waiting. Any thread.
   void StopWaiting() { shared_->StopWaiting(); }
-  // Another server has taken the records, and its meshes with them. Any thread.
-  bool IsLost() const { return shared_->AreLost(); }
+  // What the servers have in common that share the records; null: there is one alone. Any thread.
+  Sharing* sharing() const { return shared_->sharing(); }
+  // Of records that are shared: meshes that this server has from now on, as from TakeMeshes; those
+  // whose servers are gone, or the one of that name. Waits for the records.
+  std::vector<SessionOptions> Tend(const std::string& name = "");
+  // Where the mesh of that name is. Nothing: the records cannot say, as they are away and the
+  // server stops. Waits for the records.
+  std::optional<Whereabouts> Locate(const std::string& name);
   // What keeps the records does not answer, and meshes wait for it. Any thread.
   bool IsAway() const { return shared_->AreAway(); }
 

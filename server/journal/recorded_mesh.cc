@@ -12,6 +12,7 @@ using core::Message;
 using Eigen::Index;
 using Found = Records::Found;
 
+constexpr std::int64_t kNever = -1;                          // no epoch of any mesh
 constexpr std::size_t kHistoryBytes = std::size_t{1} << 20;  // of a record
 
 std::vector<Index> SizesOf(const core::QueryBatch& batch) {
@@ -31,6 +32,7 @@ RecordedMesh::RecordedMesh(std::shared_ptr<SharedJournal> journal, std::uint64_t
     : journal_(std::move(journal)),
       owner_limit_(owner_limit),
       id_(id),
+      epoch_(journal_->EpochOf(id)),
       counted_(stored.bytes),
       has_history_(stored.has_history),
       rounds_(stored.rounds),
@@ -38,6 +40,13 @@ RecordedMesh::RecordedMesh(std::shared_ptr<SharedJournal> journal, std::uint64_t
   SetShape(request);
   journal_->CountFor(owner_, static_cast<std::int64_t>(stored.bytes));
 }
+
+RecordedMesh::~RecordedMesh() { journal_->CountFor(owner_, -static_cast<std::int64_t>(counted_)); }
+
+bool RecordedMesh::IsHeld() const { return id_ == 0 || journal_->EpochOf(id_) == epoch_; }
+
+// What is deleted may have been removed already.
+bool RecordedMesh::IsElsewhere() const { return !forgotten_ && !IsHeld(); }
 
 void RecordedMesh::SetShape(const MeshRequest& request) {
   owner_ = request.owner;
@@ -57,6 +66,7 @@ std::optional<MeshFailure> RecordedMesh::Do(const char* what, FairMutex::Place p
   return journal_->Do(what, place, [&](Records* records) {
     // Under the records' lock: a removal comes before, and is seen here, or after, and sees the id.
     if (forgotten_) return true;
+    if (!IsHeld()) return false;
     const bool done = action(records);
     Recount(*records);
     return done;
@@ -90,8 +100,15 @@ std::optional<MeshFailure> RecordedMesh::WriteStart(
       id = records->NewMesh();
       return records->Put({id, RecordKind::kStart}, record);
     });
-    if (written) id_ = id;
-    return written;
+    if (!written) {
+      const auto refusal = records->trouble().refusal;
+      is_beyond_limit_ = refusal == Records::Trouble::Refusal::kTooMany;
+      if (refusal == Records::Trouble::Refusal::kTaken) epoch_ = kNever, id_ = id;
+      return false;
+    }
+    epoch_ = records->EpochOf(id);
+    id_ = id;
+    return true;
   });
 }
 
@@ -220,7 +237,7 @@ void RecordedMesh::TakeAnswers(const std::shared_ptr<const Round>& round, std::s
 
 bool RecordedMesh::HasAnswers() const {
   const std::lock_guard lock(mutex_);
-  return !pending_.empty() && !forgotten_;
+  return !pending_.empty() && !forgotten_ && IsHeld();
 }
 
 bool RecordedMesh::WriteAnswers(Records* records) {
@@ -361,7 +378,7 @@ void RecordedMesh::Forget() {
 }
 
 bool RecordedMesh::RemoveSome(Records* records, bool* done) {
-  *done = id_ == 0;
+  *done = id_ == 0 || !IsHeld();  // or its next server removes it
   if (*done) return true;
   const auto kinds = forgotten_ ? Records::Kinds::kAll : Records::Kinds::kRounds;
   const bool removed = records->RemoveSome(id_, kinds, done);

@@ -23,6 +23,7 @@ class RecordedMesh final : public SessionJournal,
   // are authenticated; 0: no limit.
   RecordedMesh(std::shared_ptr<SharedJournal> journal, std::uint64_t owner_limit)
       : journal_(std::move(journal)), owner_limit_(owner_limit) {}
+  ~RecordedMesh() override;
   // A recorded mesh.
   RecordedMesh(std::shared_ptr<SharedJournal> journal, std::uint64_t owner_limit, std::int64_t id,
                const StoredMesh& stored, const MeshRequest& request);
@@ -39,6 +40,8 @@ class RecordedMesh final : public SessionJournal,
                                          const MeshHistory& history) override;
   core::Expected<std::unique_ptr<MeshHistory>> ReadHistory() override;
   void Forget() override;
+  bool IsElsewhere() const override;
+  bool IsBeyondLimit() const override { return is_beyond_limit_; }
 
   bool HasAnswers() const override;
   bool WriteAnswers(Records* records) override;
@@ -61,16 +64,19 @@ class RecordedMesh final : public SessionJournal,
                    RecordedAnswers* answers, Records::Found* found) const;
   bool Fits(const core::QueryBatch& batch, const PartOfRound& part) const;
 
+  bool IsHeld() const;
+
   const std::shared_ptr<SharedJournal> journal_;
   const std::uint64_t owner_limit_;
   std::string owner_;
   struct {
     int dimension = 0, ambient_dimension = 0, walls = 0, simplex_dimension = 0, labels = 1;
   } shape_;
-  std::atomic<bool> forgotten_{false};
+  std::atomic<bool> forgotten_{false}, is_beyond_limit_{false};
+  std::atomic<std::int64_t> id_{0};     // 0: not recorded
+  std::atomic<std::int64_t> epoch_{0};  // Records::EpochOf then
 
   // Only for the thread that has locked the records.
-  std::int64_t id_ = 0;               // 0: not recorded
   std::uint64_t counted_ = 0;         // of its bytes, for its owner
   bool has_history_ = false;          // some of it
   std::vector<AnswerRange> written_;  // of the round

@@ -36,7 +36,11 @@ std::optional<MeshFailure> SharedJournal::Do(const char* what, FairMutex::Place 
 }
 
 MeshFailure SharedJournal::WhyNot(const char* what) {
-  const auto [full, message] = records_->trouble();
+  const auto [full, message, refusal] = records_->trouble();
+  if (refusal == Records::Trouble::Refusal::kTooMany) {
+    records_->Abandon();
+    return {FailureReason::kLimitExceeded, message};
+  }
   MeshFailure failure{full ? FailureReason::kJournalFull : FailureReason::kJournalFailed,
                       Message("the server cannot record ", what, ": ", message,
                               full ? "; free space by deleting meshes, then mesh again" : "")};
@@ -169,18 +173,28 @@ bool SharedJournal::GiveBackSome(bool* done) {
 }
 
 std::uint64_t SharedJournal::OwnerBytes(const std::string& owner) const {
-  const std::lock_guard lock(due_mutex_);
-  const auto it = owner_bytes_.find(owner);
-  return it == owner_bytes_.end() ? 0 : it->second;
+  const std::lock_guard lock(counts_mutex_);
+  std::uint64_t bytes = 0;
+  for (const auto* all : {&owner_bytes_, &elsewhere_bytes_}) {
+    if (const auto it = all->find(owner); it != all->end()) bytes += it->second;
+  }
+  return bytes;
 }
 
 std::uint64_t SharedJournal::TotalBytes() const {
-  const std::lock_guard lock(due_mutex_);
-  return total_bytes_;
+  const std::lock_guard lock(counts_mutex_);
+  std::uint64_t bytes = total_bytes_;
+  for (const auto& [owner, elsewhere] : elsewhere_bytes_) bytes += elsewhere;
+  return bytes;
+}
+
+void SharedJournal::CountElsewhere(std::map<std::string, std::uint64_t> owners_bytes) {
+  const std::lock_guard lock(counts_mutex_);
+  elsewhere_bytes_ = std::move(owners_bytes);
 }
 
 void SharedJournal::CountFor(const std::string& owner, std::int64_t bytes) {
-  const std::lock_guard lock(due_mutex_);
+  const std::lock_guard lock(counts_mutex_);
   std::uint64_t& total = owner_bytes_[owner];
   total += static_cast<std::uint64_t>(bytes);
   total_bytes_ += static_cast<std::uint64_t>(bytes);

@@ -49,8 +49,9 @@ class SharedJournal {
 
   // No thread waits any longer for records that are away: its call fails. Any thread.
   void StopWaiting() { records_->StopWaiting(); }
-  // Another server has taken the records. Any thread.
-  bool AreLost() const { return records_->AreLost(); }
+  // Records::EpochOf. Any thread.
+  std::int64_t EpochOf(std::int64_t mesh) const { return records_->EpochOf(mesh); }
+  Sharing* sharing() const { return records_->sharing(); }
   // What keeps the records does not answer. Any thread.
   bool AreAway() const { return records_->AreAway(); }
   void StartThreads();
@@ -63,6 +64,8 @@ class SharedJournal {
   std::uint64_t OwnerBytes(const std::string& owner) const;
   std::uint64_t TotalBytes() const;  // of all owners
   void CountFor(const std::string& owner, std::int64_t bytes);
+  // Those of other servers' meshes, which count as well.
+  void CountElsewhere(std::map<std::string, std::uint64_t> owners_bytes);
 
  private:
   MeshFailure WhyNot(const char* what);
@@ -83,8 +86,11 @@ class SharedJournal {
   std::deque<std::shared_ptr<Mesh>> removing_;
   bool log_is_long_ = false;
   bool space_is_due_ = false;  // of what was removed
-  std::map<std::string, std::uint64_t> owner_bytes_;
+
+  mutable std::mutex counts_mutex_;  // of these; the last to be locked
+  std::map<std::string, std::uint64_t> owner_bytes_, elsewhere_bytes_;
   std::uint64_t total_bytes_ = 0;
+
   std::jthread writer_, keeper_;
 };
 

@@ -147,6 +147,16 @@ class Metrics::Impl final : public SessionObserver {
           .Help("1 while the database of the meshes' records answers, or where there is none")
           .Register(*registry)
           .Add({}, 1);
+  prometheus::Gauge& servers =
+      prometheus::BuildGauge()
+          .Name("stellate_servers")
+          .Help("Servers that share the database of the meshes' records, this one among them")
+          .Register(*registry)
+          .Add({}, 1);
+  Counter& taken_up =
+      Count("stellate_meshes_taken_up_total", "Meshes taken up from servers that were gone");
+  Counter& passed_on =
+      Count("stellate_calls_passed_on_total", "Calls passed on to the server that has their mesh");
   prometheus::Histogram& latency =
       prometheus::BuildHistogram()
           .Name("stellate_answer_seconds")
@@ -204,6 +214,11 @@ std::shared_ptr<SessionObserver> Metrics::observer() const { return impl_; }
 
 void Metrics::Answered(double seconds) { impl_->latency.Observe(seconds); }
 void Metrics::DatabaseAnswers(bool yes) { impl_->database.Set(yes ? 1 : 0); }
+void Metrics::Share(std::size_t servers) { impl_->servers.Set(static_cast<double>(servers)); }
+void Metrics::TakenUp(std::size_t meshes) {
+  impl_->taken_up.Increment(static_cast<double>(meshes));
+}
+void Metrics::PassedOn() { impl_->passed_on.Increment(); }
 void Metrics::Refused() { impl_->refused.Increment(); }
 void Metrics::LimitReached(const std::string& setting) {
   impl_->limits.Add({{"limit", setting}}).Increment();

@@ -36,6 +36,9 @@ class Metrics {
   // Oracle streams: a chunk was answered, `seconds` after it was sent.
   void Answered(double seconds);
   void DatabaseAnswers(bool yes);
+  void Share(std::size_t servers);                // that there are, where they share a database
+  void TakenUp(std::size_t meshes);               // from servers that are gone
+  void PassedOn();                                // a call, to another server
   void Refused();                                 // a call came without a good token
   void LimitReached(const std::string& setting);  // a call was refused by that limit
   // Bytes of messages on streams, before compression and framing.

@@ -68,6 +68,47 @@ std::string CheckKey(const std::string& pem, X509* certificate) {
   return fits ? "" : "it is not the key of the certificate";
 }
 
+// The first certificate of a text; null: there is none.
+Certificate FirstIn(const std::string& pem) {
+  Certificate certificate;
+  CheckCertificates(pem, &certificate);
+  return certificate;
+}
+
+// Takes the certificate of a file, as it is now, and no other.
+class SameCertificate final : public tls::ExternalCertificateVerifier {
+ public:
+  explicit SameCertificate(std::string path) : path_(std::move(path)) {}
+
+  bool Verify(tls::TlsCustomVerificationCheckRequest* request,
+              std::function<void(grpc::Status)> /*callback*/, grpc::Status* status) override {
+    std::ifstream file(path_, std::ios::binary);
+    const Certificate ours = FirstIn({std::istreambuf_iterator<char>(file), {}});
+    const grpc::string_ref shown = request->peer_cert();
+    const Certificate theirs = FirstIn({shown.data(), shown.size()});
+    if (ours == nullptr || theirs == nullptr || X509_cmp(ours.get(), theirs.get()) != 0) {
+      *status = {grpc::StatusCode::UNAUTHENTICATED,
+                 "the other server has another certificate: all that share a database have one"};
+    }
+    return true;
+  }
+  void Cancel(tls::TlsCustomVerificationCheckRequest* /*request*/) override {}
+
+ private:
+  const std::string path_;
+};
+
+// Shows the server's own certificate.
+tls::TlsChannelCredentialsOptions OwnOptions(const Config& config) {
+  tls::TlsChannelCredentialsOptions options;
+  options.set_certificate_provider(std::make_shared<tls::FileWatcherCertificateProvider>(
+      config.tls_key, config.tls_certificate, kRefreshSeconds));
+  options.watch_identity_key_cert_pairs();
+  options.set_verify_server_certs(false);
+  options.set_check_call_host(false);
+  return options;
+}
+
 }  // namespace
 
 TlsFiles::TlsFiles(const Config& config)
@@ -176,13 +217,16 @@ std::shared_ptr<grpc::ServerCredentials> TlsFiles::Credentials() const {
 
 std::shared_ptr<grpc::ChannelCredentials> SelfCheckCredentials(const Config& config) {
   if (config.tls_certificate.empty()) return grpc::InsecureChannelCredentials();
-  tls::TlsChannelCredentialsOptions options;
-  options.set_certificate_provider(std::make_shared<tls::FileWatcherCertificateProvider>(
-      config.tls_key, config.tls_certificate, kRefreshSeconds));
-  options.watch_identity_key_cert_pairs();
-  options.set_verify_server_certs(false);
+  tls::TlsChannelCredentialsOptions options = OwnOptions(config);
   options.set_certificate_verifier(std::make_shared<tls::NoOpCertificateVerifier>());
-  options.set_check_call_host(false);
+  return tls::TlsCredentials(options);
+}
+
+std::shared_ptr<grpc::ChannelCredentials> PeerCredentials(const Config& config) {
+  if (config.tls_certificate.empty()) return grpc::InsecureChannelCredentials();
+  tls::TlsChannelCredentialsOptions options = OwnOptions(config);
+  options.set_certificate_verifier(
+      tls::ExternalCertificateVerifier::Create<SameCertificate>(config.tls_certificate));
   return tls::TlsCredentials(options);
 }
 

@@ -53,4 +53,8 @@ class TlsFiles {
 // the certificate does not name: takes any certificate, and shows the server's own.
 std::shared_ptr<grpc::ChannelCredentials> SelfCheckCredentials(const Config& config);
 
+// For calls to other servers that share a database, by whatever address: shows the server's own
+// certificate, and takes no other than that, which all of them have.
+std::shared_ptr<grpc::ChannelCredentials> PeerCredentials(const Config& config);
+
 }  // namespace stellate::server

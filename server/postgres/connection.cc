@@ -75,6 +75,8 @@ Parameters& Parameters::Add(const std::vector<std::int64_t>& values) {
   return Push(kInt8Array, std::move(bytes));
 }
 
+Parameters& Parameters::AddBytes(const std::string& bytes) { return Push(kBytea, bytes); }
+
 Parameters& Parameters::AddBytes(const std::vector<std::string>& all) {
   std::string bytes = ArrayOf(kBytea, all.size());
   for (const std::string& one : all) AppendElement(one, &bytes);

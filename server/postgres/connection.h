@@ -20,6 +20,7 @@ class Parameters {
   Parameters& Add(std::int64_t value);                        // int8
   Parameters& Add(std::string_view text);                     // text
   Parameters& Add(const std::vector<std::int64_t>& values);   // int8[]
+  Parameters& AddBytes(const std::string& bytes);             // bytea
   Parameters& AddBytes(const std::vector<std::string>& all);  // bytea[]
 
  private:

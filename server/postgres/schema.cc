@@ -13,10 +13,15 @@ using core::Status;
 
 // In the order in which they are applied, each once: what has been released is never changed.
 //
-// cluster, one row: which server may write. `term` counts the servers that had the database one
-// after the other, and is the key, so that a change of it waits for writes that hold the row FOR
-// KEY SHARE, and a beat, which changes no key, does not. `format` is kJournalVersion.
 // records: as in a file. Their bytes are floating-point numbers, which do not compress.
+// cluster: of servers that had a database one at a time. They find their term over, and cannot
+// take another.
+// common, one row: what all servers share. `format` is kJournalVersion; by `secret` they know each
+// other's calls.
+// servers: those that are there (server_lease.h).
+// meshes: who has each, and how often it has changed hands, its epoch, which every write of its
+// records checks, and holds FOR NO KEY UPDATE. `name` is null until the mesh's start is recorded,
+// and once it is deleted.
 constexpr const char* kMigrations[] = {
     "CREATE TABLE stellate.cluster (single boolean UNIQUE DEFAULT true CHECK (single), "
     "term bigint PRIMARY KEY, beats bigint NOT NULL, held boolean NOT NULL, holder text NOT NULL, "
@@ -26,6 +31,40 @@ constexpr const char* kMigrations[] = {
     "seal bigint NOT NULL, bytes bytea NOT NULL, "
     "PRIMARY KEY (mesh, kind, number, part));"
     "ALTER TABLE stellate.records ALTER bytes SET STORAGE EXTERNAL",
+
+    "CREATE TABLE stellate.common (single boolean UNIQUE DEFAULT true CHECK (single), "
+    "format bigint NOT NULL, secret bytea NOT NULL);"
+    "INSERT INTO stellate.common (format, secret) SELECT format, '' FROM stellate.cluster;"
+    "UPDATE stellate.cluster SET term = term + 1, held = false;"
+    "ALTER TABLE stellate.cluster ADD CHECK (NOT held);"
+    "CREATE TABLE stellate.servers (id bigserial PRIMARY KEY, address text NOT NULL, "
+    "beats bigint NOT NULL) WITH (fillfactor = 10);"
+    "CREATE TABLE stellate.meshes (id bigint PRIMARY KEY, name bytea UNIQUE, "
+    "owner bytea NOT NULL DEFAULT '', server bigint NOT NULL, epoch bigint NOT NULL, "
+    "ended boolean NOT NULL DEFAULT false, bytes bigint NOT NULL DEFAULT 0) "
+    "WITH (fillfactor = 50);"
+    "CREATE INDEX ON stellate.meshes (server);"
+    "CREATE INDEX ON stellate.meshes (owner) WHERE NOT ended;"
+    "INSERT INTO stellate.meshes (id, server, epoch) "
+    "SELECT DISTINCT mesh, 0::int8, 0::int8 FROM stellate.records;"
+    "CREATE SEQUENCE stellate.mesh_ids;"
+    "SELECT setval('stellate.mesh_ids', (SELECT coalesce(max(id), 0) + 1 FROM stellate.meshes), "
+    "false);"
+    // 0: the mesh is there, also if it was begun before; 1: another has the name; 2: its owner has
+    // as many. A function's statements see what was committed before each, so that the count comes
+    // after the lock.
+    "CREATE FUNCTION stellate.begin_mesh(new_id bigint, new_name bytea, new_owner bytea, "
+    "new_server bigint, most bigint) RETURNS bigint LANGUAGE plpgsql AS $$ BEGIN "
+    "IF EXISTS (SELECT FROM stellate.meshes WHERE id = new_id) THEN RETURN 0; END IF;"
+    "IF most > 0 AND new_owner <> '' THEN "
+    "PERFORM pg_advisory_xact_lock(hashtextextended(encode(new_owner, 'hex'), "
+    "6004501537215346788));"
+    "IF (SELECT count(*) FROM stellate.meshes WHERE owner = new_owner AND NOT ended) >= most "
+    "THEN RETURN 2; END IF; END IF;"
+    "INSERT INTO stellate.meshes (id, name, owner, server, epoch) "
+    "VALUES (new_id, nullif(new_name, ''), new_owner, new_server, 1) ON CONFLICT DO NOTHING;"
+    "IF EXISTS (SELECT FROM stellate.meshes WHERE id = new_id) THEN RETURN 0; END IF;"
+    "RETURN 1; END $$",
 };
 
 // In one transaction, one after the other: the lock is given back with its end.

@@ -36,6 +36,7 @@ tl::expected<std::shared_ptr<Session>, grpc::Status> FindMesh(const ServerState&
                 field));
   }
   auto session = state.store.Find(name);
+  if (session != nullptr && IsElsewhere(*session)) return tl::unexpected(MovedAway());
   if (session == nullptr || (session->request().owner != caller.owner && !caller.administrator)) {
     return tl::unexpected(Refusal(v1::ERROR_REASON_MESH_NOT_FOUND,
                                   core::Message("there is no mesh ", name,
@@ -106,6 +107,11 @@ grpc::Status NoRequest() {
   return Refusal(v1::ERROR_REASON_INVALID_ARGUMENT,
                  "no request came that this rpc understands: send one message, as "
                  "stellate/v1/stellate.proto defines it");
+}
+
+grpc::Status MovedAway() {
+  return Refusal(v1::ERROR_REASON_SHUTTING_DOWN,
+                 "the mesh goes from one server to another: call again in a moment");
 }
 
 grpc::Status ShuttingDown() {

@@ -69,5 +69,7 @@ grpc::Status NoRequest();
 
 // UNAVAILABLE: the server stops.
 grpc::Status ShuttingDown();
+// UNAVAILABLE: the mesh is on its way to another server.
+grpc::Status MovedAway();
 
 }  // namespace stellate::server

@@ -30,7 +30,7 @@ class CreateStream final : public ServerStream<v1::CreateMeshRequest, v1::Mesh> 
  public:
   using ServerStream::ServerStream;
 
-  void OnReadDone(bool ok) override {
+  void OnRequest(bool ok) override {
     const bool came = ok && request() != nullptr;
     grpc::Status status = came ? Guarded([this] { return Declare(*request()); }) : NoRequest();
     if (!status.ok()) return EndWith(std::move(status));
@@ -87,8 +87,22 @@ class CreateStream final : public ServerStream<v1::CreateMeshRequest, v1::Mesh> 
 
   Step Next() override {
     if (!session()->ports().recorded->HasHappened()) return Step::kWait;
+    const auto& journal = session()->ports().journal;
+    if (journal != nullptr && journal->IsBeyondLimit()) {
+      End(BeyondLimit());
+      return Step::kWait;
+    }
     ToProto(*session(), response());
     return Step::kSendLast;
+  }
+
+  // Of all servers together, as the record says: nothing is left of the mesh.
+  grpc::Status BeyondLimit() {
+    const SessionView view = session()->View();
+    state().store.Delete(session()->request().name);
+    return Refuse(state(),
+                  {{"owner-meshes", core::Message(state().config()->owner_meshes), "owner"},
+                   view.failure.message});
   }
 
   bool IsStuck(TimePoint now) const override {

@@ -27,7 +27,7 @@ class ExamineStream final : public ServerStream<v1::ExamineRequest, v1::ExamineR
  public:
   using ServerStream::ServerStream;
 
-  void OnReadDone(bool ok) override {
+  void OnRequest(bool ok) override {
     const bool came = ok && request() != nullptr;
     grpc::Status status = came ? Open(*request()) : NoRequest();
     {
@@ -75,6 +75,7 @@ class ExamineStream final : public ServerStream<v1::ExamineRequest, v1::ExamineR
     SessionOptions options;
     options.request = std::move(request);
     options.request.owner = caller().owner;
+    options.request.name = state().router.NewName();
     options.examiner = oracle->Examiner();
     ApplyServerPolicy(state(), &options);
     options.policy.dispatch.is_examination = true;

@@ -30,7 +30,7 @@ class HistoryStream : public ServerStream<Request, Response>, public SessionWatc
  public:
   using Base::Base;
 
-  void OnReadDone(bool ok) final {
+  void OnRequest(bool ok) final {
     grpc::Status status = ok && Base::request() != nullptr ? Open(*Base::request()) : NoRequest();
     const auto lock = Base::Lock();
     if (!status.ok()) End(std::move(status));

@@ -22,7 +22,7 @@ class UploadStream final : public ServerStream<v1::PointsChunk, v1::ReconstructR
  public:
   using ServerStream::ServerStream;
 
-  void OnReadDone(bool ok) override {
+  void OnRequest(bool ok) override {
     {
       const auto lock = Lock();
       reading_since_.reset();

@@ -29,7 +29,7 @@ class OracleStream final : public ServerStream<v1::ServeOracleRequest, v1::Serve
  public:
   using ServerStream::ServerStream;
 
-  void OnReadDone(bool ok) override {
+  void OnRequest(bool ok) override {
     if (!ok) {  // the client has gone, or will say no more
       Leave();
       EndWith(grpc::Status::OK);

@@ -11,6 +11,7 @@
 #include "server/journal/journal.h"
 #include "server/memory/memory_budget.h"
 #include "server/metrics/metrics.h"
+#include "server/rpc/router.h"
 #include "server/rpc/streams.h"
 #include "server/session/session_store.h"
 
@@ -56,6 +57,7 @@ struct ServerState {
   std::shared_ptr<Authenticator> authenticator;  // set before the first call
   Metrics metrics;
   std::atomic<bool> draining{false};  // no new meshes
+  Router router{this};
 };
 
 // Writes the server's policy for a mesh, whatever its owner, into `options`. REQUIRES: its owner is

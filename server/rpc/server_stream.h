@@ -11,6 +11,8 @@
 #include "server/convert/error_map.h"
 #include "server/rpc/call.h"
 #include "server/rpc/incoming.h"
+#include "server/rpc/relay.h"
+#include "server/rpc/routing.h"
 #include "server/rpc/streams.h"
 
 namespace stellate::server {
@@ -18,10 +20,11 @@ namespace stellate::server {
 // The skeleton of a streaming call: identifies the caller, keeps at most one message on its way,
 // and ends the call once, for the first of all reasons that the client, the mesh, the ticker and
 // the server may have. A subclass takes requests, attaches the stream to a mesh, and fills the
-// messages:
+// messages. Where another server has the mesh that the first request names, the messages go there
+// and come from there instead, and the subclass hears nothing of the call.
 //
 //   class Counter final : public ServerStream<Request, Response> {
-//     void OnReadDone(bool ok) override { ... request() Attach(mesh, bytes); ReadNext(); }
+//     void OnRequest(bool ok) override { ... request() Attach(mesh, bytes); ReadNext(); }
 //     Step Next() override { response()->set_count(++count_); return Step::kSend; }
 //   };
 //   std::make_shared<Counter>(state, context)->Start();  // lives until gRPC is done with it
@@ -31,13 +34,14 @@ namespace stellate::server {
 template <typename Request, typename Response>
 class ServerStream : public grpc::ServerBidiReactor<Incoming<Request>, Response>,
                      public Stream,
+                     public RelayedStream,
                      public std::enable_shared_from_this<ServerStream<Request, Response>> {
  public:
   ServerStream(ServerState& state, grpc::CallbackServerContext* context)
       : state_(state),
         context_(context),
-        peer_(context->peer()),
-        caller_(Identify(state, *context)) {}
+        caller_(Identify(state, *context)),
+        peer_(caller_ && caller_->is_passed_on ? caller_->address : context->peer()) {}
 
   // Reads the first request, or refuses a caller who is not known.
   void Start() {
@@ -47,21 +51,43 @@ class ServerStream : public grpc::ServerBidiReactor<Incoming<Request>, Response>
     ReadNext();
   }
 
+  void OnReadDone(bool ok) final {
+    if (relay_ != nullptr) return PassOn(ok);
+    if (was_routed_) return OnRequest(ok);
+    was_routed_ = true;
+    const std::string mesh = ok && request() != nullptr ? MeshNamedIn(*request()) : "";
+    if (mesh.empty()) return OnRequest(ok);
+    {
+      const auto lock = Lock();
+      is_kept_ = true;
+    }
+    state_.router.Find(mesh, caller_->is_passed_on, [self = this->shared_from_this()](Route route) {
+      self->Follow(std::move(route));
+    });
+  }
+
   void OnWriteDone(bool ok) final {
-    if (!ok) Leave();
-    const auto lock = Lock();
-    if (phase_ == Phase::kWriting) phase_ = Phase::kIdle;
-    if (!ok) End(grpc::Status::CANCELLED);
-    Pump();
+    if (!ok) LeaveAll();
+    bool wants_more = false;
+    {
+      const auto lock = Lock();
+      if (phase_ == Phase::kWriting) {
+        phase_ = Phase::kIdle;
+        wants_more = relay_ != nullptr;
+      }
+      if (!ok) End(grpc::Status::CANCELLED);
+      Pump();
+    }
+    if (wants_more) relay_->Next();
   }
 
   void OnCancel() final {
-    Leave();
+    LeaveAll();
     EndWith(grpc::Status::CANCELLED);
   }
 
   void OnDone() final {
-    Leave();
+    LeaveAll();
     std::shared_ptr<ServerStream> self;  // outlives the lock
     const auto lock = Lock();
     phase_ = Phase::kDone;
@@ -71,18 +97,29 @@ class ServerStream : public grpc::ServerBidiReactor<Incoming<Request>, Response>
   void Tick(TimePoint now) final {
     if (caller_ && !state_.authenticator->StillHolds(*caller_)) {
       EndWith(TokenWithdrawn());
-      Leave();
+      LeaveAll();
     }
     const auto lock = Lock();
     if (phase_ == Phase::kDone) return;
-    if (IsStuck(now)) return context_->TryCancel();
-    OnTick(now);
+    const bool is_sending = phase_ == Phase::kWriting || phase_ == Phase::kFinished;
+    const std::chrono::duration<double> unread(state_.config()->unread_seconds);
+    if (relay_ != nullptr ? is_sending && now - last_write_ > unread : IsStuck(now))
+      return context_->TryCancel();
+    if (relay_ == nullptr && !is_kept_) OnTick(now);
   }
 
   void StopServing() override {
     EndWith(ShuttingDown());  // first: what Leave brings about is no other end
-    Leave();
+    LeaveAll();
   }
+
+  void OnTaken() final { ReadNext(); }
+  void OnAnswer() final {
+    const auto lock = Lock();
+    has_answer_ = true;
+    Pump();
+  }
+  void OnOver(grpc::Status status) final { EndWith(std::move(status)); }
 
  protected:
   enum class Step { kWait, kSend, kSendLast };
@@ -93,6 +130,8 @@ class ServerStream : public grpc::ServerBidiReactor<Incoming<Request>, Response>
     kDone,      // gRPC has forgotten the call
   };
 
+  // A request has come, or, where `ok` is false, none will come any more.
+  virtual void OnRequest(bool ok) = 0;
   // (locked) Fills response(), which is empty, or calls End. Only once a mesh is attached.
   virtual Step Next() = 0;
   // (locked) The same once End was called: the last messages before its status. kWait: none.
@@ -130,7 +169,7 @@ class ServerStream : public grpc::ServerBidiReactor<Incoming<Request>, Response>
   // (locked) The first end counts; Pump sends it.
   void End(grpc::Status status) {
     if (end_) return;
-    end_ = std::move(status);
+    end_ = HasMoved() ? MovedAway() : std::move(status);
     ended_ = Clock::now();
     OnEnd();
   }
@@ -145,8 +184,16 @@ class ServerStream : public grpc::ServerBidiReactor<Incoming<Request>, Response>
     if (phase_ != Phase::kIdle) return;
     response_.Clear();
     Step step = Step::kWait;
-    if (!end_ && session_ != nullptr) step = Next();
-    if (end_) step = AfterEnd();
+    if (!end_ && HasMoved()) End(MovedAway());
+    if (relay_ != nullptr) {
+      if (std::exchange(has_answer_, false)) {
+        response_.Swap(&relay_->answer());
+        step = Step::kSend;
+      }
+    } else {
+      if (!end_ && session_ != nullptr) step = Next();
+      if (end_ && !HasMoved()) step = AfterEnd();
+    }
     if (!end_ && step == Step::kWait) return;
     last_write_ = Clock::now();
     if (step == Step::kWait || step == Step::kSendLast) {
@@ -180,10 +227,51 @@ class ServerStream : public grpc::ServerBidiReactor<Incoming<Request>, Response>
   TimePoint last_write() const { return last_write_; }  // (locked) was begun then
 
  private:
+  void LeaveAll() {
+    std::shared_ptr<Relay<Request, Response>> relay;
+    {
+      const auto lock = Lock();
+      relay = relay_;
+    }
+    if (relay != nullptr) relay->Cancel();
+    Leave();
+  }
+
+  // The first request, where its mesh is.
+  void Follow(Route route) {
+    {
+      const auto lock = Lock();
+      is_kept_ = false;
+      if (end_) return;
+      if (route.kind == Route::Kind::kNotNow) {
+        End(MovedAway());
+        return Pump();
+      }
+      if (route.kind == Route::Kind::kThere) {
+        relay_ = std::make_shared<Relay<Request, Response>>(route);
+        state_.router.Introduce(route, *caller_, peer_, *context_, relay_->context());
+        last_write_ = Clock::now();
+      }
+    }
+    if (relay_ == nullptr) return OnRequest(true);
+    relay_->Start(this->shared_from_this(), PathOf<Request>());
+    relay_->Send(request_.message);
+  }
+
+  void PassOn(bool ok) {
+    if (!ok) return relay_->SendNoMore();
+    if (request() != nullptr) return relay_->Send(request_.message);
+    EndWith(NoRequest());
+    LeaveAll();
+  }
+
+  // (locked) What the stream has of it is no end that a client may hear of.
+  bool HasMoved() const { return session_ != nullptr && IsElsewhere(*session_); }
+
   ServerState& state_;
   grpc::CallbackServerContext* const context_;
-  const std::string peer_;  // asked of the context while there surely is a call
   const tl::expected<Identity, grpc::Status> caller_;
+  const std::string peer_;  // asked of the context while there surely is a call
 
   std::mutex mutex_;
   std::shared_ptr<ServerStream> self_;  // until gRPC is done
@@ -194,6 +282,10 @@ class ServerStream : public grpc::ServerBidiReactor<Incoming<Request>, Response>
   TimePoint ended_, last_write_ = Clock::now();
   Incoming<Request> request_;
   Response response_;
+  bool was_routed_ = false;                          // the reading side's alone
+  bool is_kept_ = false;                             // until it is known where its mesh is
+  bool has_answer_ = false;                          // of the relay
+  std::shared_ptr<Relay<Request, Response>> relay_;  // set at most once, before it is started
 };
 
 }  // namespace stellate::server

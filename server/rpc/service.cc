@@ -1,16 +1,29 @@
 #include "server/rpc/service.h"
 
 #include <google/protobuf/descriptor.h>
+#include <grpcpp/generic/generic_stub.h>
 
 #include <optional>
 #include <utility>
 
 #include "core/base/message.h"
+#include "server/rpc/routing.h"
 #include "server/rpc/rpcs.h"
 #include "stellate/v1/stellate.grpc.pb.h"
 
 namespace stellate::server {
 namespace {
+
+template <typename Request>
+void FindRoute(Router& router, const Request& request, bool is_passed_on, Router::Then then) {
+  const std::string mesh = MeshNamedIn(request);
+  if (mesh.empty()) return then({});
+  router.Find(mesh, is_passed_on, std::move(then));
+}
+void FindRoute(Router& router, const v1::ListMeshesRequest& request, bool is_passed_on,
+               const Router::Then& then) {
+  then(router.FindPage(request.page_token(), is_passed_on));
+}
 
 // One request, one response.
 template <typename Request, typename Response>
@@ -19,30 +32,55 @@ class UnaryCall final : public grpc::ServerBidiReactor<Request, Response> {
   using Handler = grpc::Status (*)(const Call&, const Request&, Response*);
 
   UnaryCall(ServerState& state, const grpc::CallbackServerContext& context, Handler handler)
-      : handler_(handler) {
+      : handler_(handler), context_(context) {
     auto caller = Identify(state, context);
     if (!caller) {
       this->Finish(caller.error());
       return;
     }
-    call_.emplace(Call{state, std::move(*caller), context.peer()});
+    std::string address = caller->is_passed_on ? caller->address : context.peer();
+    call_.emplace(Call{state, std::move(*caller), std::move(address)});
     this->StartRead(&request_);
   }
 
   void OnReadDone(bool ok) override {
     if (!ok) return this->Finish(NoRequest());
-    grpc::Status status = Guarded([this] { return handler_(*call_, request_, &response_); });
+    FindRoute(call_->state.router, request_, call_->caller.is_passed_on,
+              [this](Route route) { Follow(std::move(route)); });
+  }
+
+  void OnCancel() override { passed_on_.TryCancel(); }
+  void OnDone() override { delete this; }
+
+ private:
+  void Follow(Route route) {
+    route_ = std::move(route);
+    switch (route_.kind) {
+      case Route::Kind::kHere:
+        return Reply(Guarded([this] { return handler_(*call_, request_, &response_); }));
+      case Route::Kind::kNotNow:
+        return Reply(MovedAway());
+      case Route::Kind::kThere:
+        break;
+    }
+    call_->state.router.Introduce(route_, call_->caller, call_->peer, context_, &passed_on_);
+    grpc::TemplatedGenericStub<Request, Response>(route_.channel)
+        .UnaryCall(&passed_on_, PathOf<Request>(), {}, &request_, &response_,
+                   [this](grpc::Status status) { Reply(std::move(status)); });
+  }
+
+  void Reply(grpc::Status status) {
     if (!status.ok()) return this->Finish(std::move(status));
     this->StartWriteAndFinish(&response_, grpc::WriteOptions(), std::move(status));
   }
 
-  void OnDone() override { delete this; }
-
- private:
   const Handler handler_;
+  const grpc::CallbackServerContext& context_;
   std::optional<Call> call_;
   Request request_;
   Response response_;
+  Route route_;
+  grpc::ClientContext passed_on_;
 };
 
 }  // namespace

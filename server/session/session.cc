@@ -383,11 +383,13 @@ Session::Ending Session::ChooseEnd(const core::Report* report) {
   SessionEnd& end = ending.end;
   end = {FinalState(report), std::max(std::chrono::system_clock::now(), create_time_),
          Seconds(Clock::now() - created_), failure_, progress_.round};
+  ending.is_elsewhere = IsElsewhere(*this);
   ending.server_stops = life_.now() == Life::kSuspended;
   // Also where the journal was waited for, and the wait was broken off.
-  ending.is_suspended = ending.server_stops && ports().journal != nullptr &&
-                        (end.state == SessionState::kCancelled ||
-                         end.failure.reason == FailureReason::kJournalFailed);
+  ending.is_suspended =
+      ending.is_elsewhere || (ending.server_stops && ports().journal != nullptr &&
+                              (end.state == SessionState::kCancelled ||
+                               end.failure.reason == FailureReason::kJournalFailed));
   const bool ended_before = record && record->end;
   // Cancelled, and its replay broken off: the next server repeats all that watchers have seen.
   if (record && end.state == SessionState::kCancelled) {
@@ -428,7 +430,10 @@ void Session::ShowEnd(const Ending& ending) {
     life_.Step(LifeEvent::kShow);
   }
   Log(ending.end.state == SessionState::kFailed ? LogLevel::kWarning : LogLevel::kInfo,
-      log_context(), ending.is_suspended ? "mesh suspended until the server is back" : "mesh ended",
+      log_context(),
+      ending.is_elsewhere   ? "mesh goes on in another server"
+      : ending.is_suspended ? "mesh suspended until the server is back"
+                            : "mesh ended",
       fields);
   pool_.Close({blame_});
   if (intake_ != nullptr) intake_->Close(blame_);

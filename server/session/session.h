@@ -87,6 +87,7 @@ class Session {
     SessionEnd end;
     core::Report report;
     bool server_stops = false;
+    bool is_elsewhere = false;  // another server has the mesh
     bool is_suspended = false;  // the next server goes on with the mesh: nothing is recorded
     bool is_whole = false;      // the mesh is what led to this end, on this server or before
   };
@@ -136,5 +137,8 @@ class Session {
   std::optional<SessionEnd> end_;  // once clients can see it, as the report
   std::optional<core::Report> report_;
 };
+
+// Another server goes on with the mesh: clients are to be led there, and see nothing of it here.
+bool IsElsewhere(const Session& session);
 
 }  // namespace stellate::server

@@ -94,6 +94,12 @@ class SessionJournal {
 
   // The mesh was deleted: removes its record, soon. Any thread; does not block.
   virtual void Forget() = 0;
+
+  // Another server goes on with the mesh: nothing of it is written here any more, and no client may
+  // hear of it what is not recorded. Any thread.
+  virtual bool IsElsewhere() const { return false; }
+  // WriteStart failed as its owner has as many meshes as the servers allow together. Any thread.
+  virtual bool IsBeyondLimit() const { return false; }
 };
 
 }  // namespace stellate::server

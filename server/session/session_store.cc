@@ -210,6 +210,24 @@ bool SessionStore::Delete(const std::string& name) {
   return true;
 }
 
+void SessionStore::YieldElsewhere() {
+  std::vector<std::shared_ptr<Session>> run, unrun;
+  {
+    const std::lock_guard lock(mutex_);
+    for (auto it = entries_.begin(); it != entries_.end();) {
+      const auto at = it++;
+      const std::shared_ptr<Session> session = at->second.session;
+      if (!IsElsewhere(*session)) continue;
+      (std::erase(unreplayed_, at->first) == 0 ? run : unrun).push_back(session);
+      numbers_.erase(session->request().name);
+      dying_.push_back(std::move(at->second));
+      entries_.erase(at);
+    }
+  }
+  for (const auto& session : run) session->Suspend();
+  for (const auto& session : unrun) session->AbandonUnrun();
+}
+
 SessionStore::Page SessionStore::List(std::uint64_t after, std::size_t count,
                                       const std::optional<std::string>& owner) const {
   const std::lock_guard lock(mutex_);

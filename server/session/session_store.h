@@ -57,6 +57,9 @@ class SessionStore {
   // Cancels and deletes a mesh; false if there is none.
   bool Delete(const std::string& name);
 
+  // Lets go of meshes that other servers have.
+  void YieldElsewhere();
+
   // Returns the history of a mesh. Null: it is being read back from the journal; the mesh's
   // watchers are woken when it has been read, or is lost.
   std::shared_ptr<const MeshHistory> OpenHistory(const std::shared_ptr<Session>& session) {

@@ -50,6 +50,11 @@ bool Session::Over() const { return life() == Life::kOver; }
 
 bool Session::HasEnded() const { return server::HasEnded(life()); }
 
+bool IsElsewhere(const Session& session) {
+  const auto& journal = session.ports().journal;
+  return journal != nullptr && journal->IsElsewhere();
+}
+
 bool Session::IsReplaying() const { return server::IsReplaying(life()); }
 
 SessionView Session::View() const {

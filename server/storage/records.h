@@ -24,6 +24,52 @@ struct StoredMesh {
   bool Note(const Place& place, std::string_view record);
 };
 
+// Where a mesh is that several servers share the records of.
+struct Whereabouts {
+  bool exists = false;
+  std::int64_t server = 0;  // that has it
+  bool is_gone = false;     // that server is: none has the mesh
+  std::string address;      // of that server, for others to call; empty: not known yet
+};
+
+// A server that shares the records.
+struct Peer {
+  std::int64_t number = 0;
+  std::string address;  // empty: not known yet; kUnlisted
+};
+// The address of one that takes no calls.
+inline constexpr char kUnlisted[] = "-";
+
+// What a server of several has to do now and then has brought.
+struct Tidings {
+  std::map<std::int64_t, StoredMesh> meshes;          // that this server has from now on
+  std::map<std::string, std::uint64_t> owners_bytes;  // of the meshes of other servers, by owner
+  std::vector<std::string> troubles;                  // why a mesh could not be taken up
+};
+
+// What several servers share the records by. Any thread, unless it says the records' own.
+class Sharing {
+ public:
+  virtual ~Sharing() = default;
+
+  // This server's number among them, another one once it was away for too long.
+  virtual std::int64_t number() const = 0;
+  virtual std::vector<Peer> Peers() const = 0;  // all servers, this one too, ascending
+  // Known to these servers alone.
+  virtual const std::string& secret() const = 0;
+  // Where others reach this server, once it listens.
+  virtual void Announce(const std::string& address) = 0;
+  // Whether Tend has something to do that cannot wait.
+  virtual bool IsTendingDue() const = 0;
+  // A mesh that is begun must not be its owner's `limit + 1`st on all servers; 0: no limit.
+  virtual void LimitOwners(std::uint64_t limit) = 0;
+
+  // The records' thread. Takes up meshes whose servers are gone: a share of them, or the one of
+  // that name.
+  virtual bool Tend(const std::string& name, Tidings* tidings) = 0;
+  virtual bool Locate(const std::string& name, Whereabouts* found) = 0;
+};
+
 // Sealed records by place, whatever their meaning, on a disk or in a database. One thread at a
 // time, except where it says so. After a call that returned false, trouble() says why, and
 // Abandon() must be called before the next.
@@ -61,15 +107,22 @@ class Records {
   struct Trouble {
     bool full = false;    // no room, as opposed to a fault
     std::string message;  // what went wrong
+    enum class Refusal {
+      kNone,
+      kTooMany,  // the mesh's owner has as many as the servers allow together
+      kTaken,    // another mesh has the name
+    } refusal = Refusal::kNone;
   };
   virtual Trouble trouble() const = 0;
 
   // No call waits any longer for what keeps the records, should that be away: it returns false.
   // Any thread.
   virtual void StopWaiting() {}
-  // Another server has taken the records. Writes wait from then on, until StopWaiting, so that no
-  // client hears of a failure of meshes that go on there. Any thread.
-  virtual bool AreLost() const { return false; }
+  // How often the mesh has changed hands, as this server has it; another number, or 0: it is not
+  // this server's any more, and nothing is written of it. Any thread.
+  virtual std::int64_t EpochOf(std::int64_t /*mesh*/) const { return 1; }
+  // Null: one server has them. Lives as long as this.
+  virtual Sharing* sharing() { return nullptr; }
   // What keeps them does not answer. Any thread.
   virtual bool AreAway() const { return false; }
 

@@ -147,6 +147,7 @@ SERVER = {
         "server/points",
         "server/records",
         "server/session",
+        "server/storage",
         "server/journal",
         "server/metrics",
         "server/convert",

@@ -88,6 +88,7 @@ TEST_F(JournalTest, AnOwnerHasHisShareAndDeletionGivesItBack) {
   EXPECT_FALSE(opened->RefuseNewMesh("somebody else", kMesh));
   EXPECT_FALSE(mesh->WriteEnd({SessionState::kFailed, {}, 0, *failure, round}));
   SessionOptions options = RecordedSphere(others);
+  options.request.name = "meshes/89abcdef0123456789abcdef01234567";
   options.request.owner = "somebody else";
   EXPECT_FALSE(others->WriteStart(options.request, {}));
   EXPECT_FALSE(WriteOneRound(others.get(), 1, 100));
@@ -101,7 +102,9 @@ TEST_F(JournalTest, AFullFileFailsTheRoundAloneAndDeletionMakesRoom) {
   const auto journal = Open(1 << 20);
   const auto small = journal->NewMesh(), large = journal->NewMesh();
   ASSERT_FALSE(small->WriteStart(RecordedSphere(small).request, {}));
-  ASSERT_FALSE(large->WriteStart(RecordedSphere(large).request, {}));
+  SessionOptions options = RecordedSphere(large);
+  options.request.name = "meshes/89abcdef0123456789abcdef01234567";
+  ASSERT_FALSE(large->WriteStart(options.request, {}));
   ASSERT_FALSE(WriteOneRound(large.get(), 1, 8000));
   EXPECT_FALSE(journal->RefuseNewMesh("", 1000));
   const auto failure = WriteOneRound(large.get(), 2, 8000);

@@ -1,5 +1,6 @@
 // Whole meshes, and the servers that they outlive.
 
+#include "core/base/message.h"
 #include "tests/server/support/blank_journal.h"
 #include "tests/server/support/journal_fixture.h"
 
@@ -136,7 +137,9 @@ TEST_F(JournalTest, ASteppedClockChangesNothingOfHowLongAMeshTook) {
     double before = 0;
     {
       const auto journal = Open();
-      before = RunMesh(RecordedSphere(journal->NewMesh()), 3).view.elapsed_seconds;
+      SessionOptions mesh = RecordedSphere(journal->NewMesh());
+      if (step.count() > 0) mesh.request.name = "meshes/89abcdef0123456789abcdef01234567";
+      before = RunMesh(std::move(mesh), 3).view.elapsed_seconds;
     }
     const auto journal = Open();
     auto meshes = journal->TakeMeshes();
@@ -257,7 +260,9 @@ TEST_F(JournalTest, ACancelledMeshStaysAsItWas) {
     SessionView before;
     {
       const auto journal = Open();
-      Session session(RecordedSphere(journal->NewMesh(), 0.1));
+      SessionOptions mesh = RecordedSphere(journal->NewMesh(), 0.1);
+      mesh.request.name = core::Message("meshes/", revision);  // those before are kept
+      Session session(std::move(mesh));
       std::thread thread([&] { session.Run(); });
       const auto worker = FakeWorker::Join(&session.pool());
       while (session.View().revision < revision && !session.HasEnded()) std::this_thread::yield();
