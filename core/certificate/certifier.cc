@@ -26,9 +26,9 @@ namespace {
 // then come rounds:
 //   1. points inside simplices, vertices, coverage probes, small steps that compare given tangent
 //      spaces with closest points, and the first step of the balls;
-//   2. tangents at the probes' closest points, by differences, if the oracle sends none; the second
-//      step of the balls; steps over what may be an undeclared boundary; shorter steps where small
-//      ones went wrong;
+//   2. tangents at the probes' closest points, by differences, where neither the oracle nor the
+//      answer tells them; the second step of the balls; steps over what may be an undeclared
+//      boundary; shorter steps where small ones went wrong;
 //   3. in a thorough audit, balls at the barycentres' closest points as well.
 // All answers, and those that were known before, are then compared with the mesh.
 class WholeRounds final : public CertifierRounds {
@@ -56,7 +56,7 @@ class WholeRounds final : public CertifierRounds {
   void Absorb(const std::vector<AnswerBlock>& answers) override {
     if (finished_) return;
     // They measure the oracle's own error, which all other judgements need.
-    if (ball_steps_ == 0) claims_->closeness.JudgeVertices(answers[vertices_]);
+    if (ball_steps_ == 0) claims_->closeness.JudgeVertices(answers[vertices_], answers[inside_]);
     if (ball_steps_ == 0 && sheets_) sheets_->JudgeKnown();
     for (std::size_t b = 0; b < blocks_.size(); ++b) {
       if (sheets_) Note(blocks_[b].face, answers[b]);
@@ -128,6 +128,7 @@ class WholeRounds final : public CertifierRounds {
 
   void AskFirst() {
     Claims& c = *claims_;
+    inside_ = blocks_.size();
     Ask(c.closeness.InsideQuestions(), [this](const Eigen::MatrixXd& asked, const AnswerBlock& a) {
       const ClosenessClaims& closeness = claims_->closeness;
       if (regions_)
@@ -191,7 +192,7 @@ class WholeRounds final : public CertifierRounds {
     const bool first = ball_steps_++ == 0;
     blocks_.clear();
     judges_.clear();
-    if (first && !x_.spec.oracle.tangent_basis)
+    if (first)
       Ask(c.coverage.DifferenceQuestions(),
           [&c](const Eigen::MatrixXd&, const AnswerBlock& a) { c.coverage.JudgeDifferences(a); });
     if (sheets_) AskOfEach(*sheets_, sheets_->QuestionsWhereClearancesDip(), &SheetClaims::Judge);
@@ -245,8 +246,8 @@ class WholeRounds final : public CertifierRounds {
   int ball_steps_ = 0;
   bool finished_ = false;
   std::vector<QueryBlock> blocks_;
-  std::vector<Judge> judges_;  // of the blocks; none of the vertices', which come first
-  std::size_t vertices_ = 0;   // their block in the first round
+  std::vector<Judge> judges_;              // of the blocks; none of the vertices', which come first
+  std::size_t inside_ = 0, vertices_ = 0;  // the blocks of these in the first round
 };
 
 }  // namespace

@@ -19,9 +19,11 @@ constexpr std::size_t kLongestTrend = 12, kShortestTrend = 3;
 constexpr double kLeastYield = 0.02;
 // A fraction that has proved too large by more than this does not foretell the time.
 constexpr double kTooLarge = 0.05;
-// The certificate's queries about simplices, about vertices (at most), and others; and those of a
-// thorough audit for each simplex.
-constexpr double kOfSimplices = 2200, kOfVertices = 1500, kBesides = 1000, kThorough = 5;
+// The certificate's queries (core/certificate/evidence/probes.h): about simplices, at most; at
+// vertices, a vertex and at most; others, with all differences that may be needed; those about
+// walls. And those of a thorough audit for each simplex.
+constexpr double kOfSimplices = 2200, kAtVertices = 0.5, kMostAtVertices = 770, kBesides = 600;
+constexpr double kOfWalls = 2000, kThorough = 5;
 
 template <int K>
 void CountAll(const Engine<K>& engine, Progress* progress) {
@@ -44,7 +46,10 @@ void CountAll(const Engine<K>& engine, Progress* progress) {
 }  // namespace
 
 ProgressMeter::ProgressMeter(const Specification& spec)
-    : epsilon_(spec.epsilon), is_thorough_(spec.audit == Audit::kThorough), k_(spec.dimension) {}
+    : epsilon_(spec.epsilon),
+      is_thorough_(spec.audit == Audit::kThorough),
+      has_walls_(spec.walls > 0),
+      k_(spec.dimension) {}
 
 void ProgressMeter::Know(const AnsweredPoints& seeds, const std::vector<std::uint8_t>& used) {
   for (Eigen::Index c = 0; c < seeds.points.cols() && known_ < kMostKnown; ++c) {
@@ -114,13 +119,17 @@ ProgressMeter::Left ProgressMeter::LeftToRefine(const Engine<K>& engine) {
           false};
 }
 
-double ProgressMeter::QuestionsOfCertificate(const Progress& progress) const {
-  const double vertices = static_cast<double>(progress.vertices);
+// to_come: vertices, with as many simplices each as those that there are.
+double ProgressMeter::QuestionsOfCertificate(const Progress& progress, double to_come) const {
+  const auto have = static_cast<double>(progress.vertices);
+  const double vertices = have + to_come;
   // As many as a closed manifold has.
-  const double simplices =
-      progress.simplices > 0 ? static_cast<double>(progress.simplices) : k_ * vertices;
+  const double simplices = progress.simplices > 0
+                               ? static_cast<double>(progress.simplices) * vertices / have
+                               : k_ * vertices;
   if (is_thorough_) return kThorough * simplices;
-  return std::min(simplices, kOfSimplices) + std::min(vertices, kOfVertices) + kBesides;
+  return std::min(simplices, kOfSimplices) + std::min(kAtVertices * vertices, kMostAtVertices) +
+         kBesides + (has_walls_ ? kOfWalls : 0);
 }
 
 template <int K>
@@ -135,11 +144,13 @@ void ProgressMeter::Measure(const Engine<K>& engine, bool is_certifying, double 
   if (stars.size() == 0) return;
 
   const auto asked = static_cast<double>(progress->queries);
-  double left = QuestionsOfCertificate(*progress);
+  double left = 0;
   bool is_known = true;
   if (is_certifying) {
     if (before_certificate_ == 0) before_certificate_ = progress->queries;
-    left = std::max(left - static_cast<double>(progress->queries - before_certificate_), 0.0);
+    left = std::max(QuestionsOfCertificate(*progress, 0) -
+                        static_cast<double>(progress->queries - before_certificate_),
+                    0.0);
   } else {
     before_certificate_ = 0;
     Cover(stars);
@@ -149,7 +160,8 @@ void ProgressMeter::Measure(const Engine<K>& engine, bool is_certifying, double 
     const Left vertices =
         grows ? LeftToSample<K>(engine, std::max(to_sample, engine.CountMissing(0.5)))
               : LeftToRefine<K>(engine);
-    left += vertices.vertices * std::max(asked / static_cast<double>(stars.size()), 1.0);
+    left = QuestionsOfCertificate(*progress, vertices.vertices) +
+           vertices.vertices * std::max(asked / static_cast<double>(stars.size()), 1.0);
     is_known = vertices.is_known;
   }
   const double share = std::min(0.99, asked / (asked + left + 1));

@@ -40,10 +40,11 @@ class ProgressMeter {
   Left LeftToSample(const Engine<K>& engine, double to_sample);
   template <int K>
   Left LeftToRefine(const Engine<K>& engine);
-  double QuestionsOfCertificate(const Progress& progress) const;
+  double QuestionsOfCertificate(const Progress& progress, double to_come) const;
 
   double epsilon_;
   bool is_thorough_;
+  bool has_walls_;
   int k_;
   std::vector<double> open_;     // known points that the sample is not near yet, d each
   std::size_t known_ = 0;        // of them at first

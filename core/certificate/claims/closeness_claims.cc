@@ -76,7 +76,7 @@ Eigen::MatrixXd ClosenessClaims::TangentQuestions() {
   return tangents_->Questions();
 }
 
-void ClosenessClaims::JudgeVertices(const AnswerBlock& answer) {
+void ClosenessClaims::JudgeVertices(const AnswerBlock& answer, const AnswerBlock& inside) {
   double worst = 0;
   for (std::size_t n = 0; n < vertices_.size(); ++n) {
     const std::uint32_t v = vertices_[n];
@@ -95,7 +95,11 @@ void ClosenessClaims::JudgeVertices(const AnswerBlock& answer) {
     }
   }
   // With a larger error the answers would have failed the repeat check (core/run/repeat_check.h).
-  const double rounding = RoundingOf(answer.points, kNoticeablePositionError * x_.size);
+  std::vector<Eigen::Index> found;
+  for (Eigen::Index j = 0; j < inside.points.cols(); ++j)
+    if (Found(inside, j)) found.push_back(j);
+  const double rounding =
+      RoundingOf(inside.points(Eigen::all, found), kNoticeablePositionError * x_.size);
   x_.position_error = std::max(
       {worst, rounding, kLeastError * x_.size, kRoundingShare * LargestCoordinate(x_.mesh)});
   if (worst > kNoticeablePositionError * x_.size && worst <= kPositionTolerance * x_.size) {

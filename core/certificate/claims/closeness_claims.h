@@ -26,8 +26,9 @@ class ClosenessClaims {
   Eigen::MatrixXd TangentQuestions();  // empty if the oracle gives no tangents, or all is decided
   Eigen::MatrixXd BoundaryQuestions() { return boundary_check_.Questions(x_.position_error); }
 
-  // Sets the examination's position_error. Call it before all other judgements.
-  void JudgeVertices(const AnswerBlock& answer);
+  // Sets the examination's position_error, from answers to VertexQuestions and InsideQuestions.
+  // Call it before all other judgements.
+  void JudgeVertices(const AnswerBlock& answer, const AnswerBlock& inside);
   void JudgeInside(const Eigen::MatrixXd& asked, const AnswerBlock& answer);
   void JudgeTangents(const AnswerBlock& answer);
   void JudgeBends();  // once there are no more TangentQuestions

@@ -16,6 +16,14 @@ namespace {
 // Step of tangents by differences, as a share of the mesh size: above the noise, below curvature.
 constexpr double kDifferenceStep = 0.1;
 
+// The normal that an answer tells is read so many position errors from M: they turn it by a
+// hundredth.
+constexpr double kErrorsInNormal = 100;
+// What the vertices near by know of a tangent space must differ from that normal by no more (a
+// sine) for the two to be relied on. In codimension 1 the normal alone tells all, and only where M
+// ends or has a crease is it far off.
+constexpr double kMostOff = 0.03, kMostOffAlone = 0.3;
+
 }  // namespace
 
 Eigen::MatrixXd CoverageClaims::ProbeQuestions() const {
@@ -34,7 +42,7 @@ void CoverageClaims::JudgeProbes(const Eigen::MatrixXd& asked, const AnswerBlock
   const std::vector<NearestVertex> nearest = FindNearestVertices(x_.mesh, points, x_.size);
   for (std::size_t n = 0; n < found.size(); ++n) {
     const Eigen::Index j = found[n];
-    Probe probe{answer.points.col(j), nearest[n], {}};
+    Probe probe{answer.points.col(j), nearest[n], {}, false, asked.col(j)};
     if (probe.nearest.distance > kCoverageShare * x_.size) {
       ++x_.certificate.fibre_samples;
       Fail(probe);
@@ -49,56 +57,103 @@ void CoverageClaims::JudgeProbes(const Eigen::MatrixXd& asked, const AnswerBlock
       for (int a = 0; a < x_.mesh.k; ++a)
         for (int i = 0; i < x_.mesh.d; ++i)
           probe.tangent.push_back(answer.tangents(i * x_.mesh.k + a, j));
+      probe.knows_tangent = true;
     } else {
       const double* t = x_.mesh.Tangent(probe.nearest.vertex);
       probe.tangent.assign(t, t + x_.mesh.d * x_.mesh.k);
     }
-    const Eigen::Map<const Eigen::MatrixXd> tangent(probe.tangent.data(), x_.mesh.d, x_.mesh.k);
     // At the boundary the flat may miss the mesh by as much as the boundary bends.
     if (x_.mesh.WallsOf(probe.nearest.vertex) != 0) continue;
-    const Eigen::VectorXd step = asked.col(j) - probe.x;
-    // Another vertex's tangent space says little of an offset's direction.
     if (answer.tangents.size() > 0)
-      boundary_check_.Add(probe.x, tangent * (tangent.transpose() * step), step.norm());
+      NoteOffset(probe);
+    else
+      ReadTangent(&probe);
     probes_.push_back(std::move(probe));
   }
-  if (x_.spec.oracle.tangent_basis) JudgeFibres();
+  if (std::all_of(probes_.begin(), probes_.end(), [](const Probe& p) { return p.knows_tangent; }))
+    JudgeFibres();
+}
+
+// REQUIRES: the probe's own tangent space is known: another vertex's says little of an offset's
+// direction.
+void CoverageClaims::NoteOffset(const Probe& probe) {
+  const Eigen::Map<const Eigen::MatrixXd> tangent(probe.tangent.data(), x_.mesh.d, x_.mesh.k);
+  const Eigen::VectorXd step = probe.asked - probe.x;
+  boundary_check_.Add(probe.x, tangent * (tangent.transpose() * step), step.norm());
+}
+
+// Returns an orthonormal basis of the tangent space at a probe as the vertices of the simplex under
+// it have it, d x k: interpolated, it is right to the second order of size over reach.
+Eigen::MatrixXd CoverageClaims::TangentsNear(const Probe& probe) const {
+  const Eigen::Index k = x_.mesh.k;
+  const std::uint32_t* under = nullptr;
+  double nearest = INFINITY;
+  for (const std::uint32_t s : x_.stars->Star(probe.nearest.vertex)) {
+    const std::uint32_t* ids = x_.list()[s];
+    Eigen::VectorXd barycentre = Eigen::VectorXd::Zero(x_.mesh.d);
+    for (Eigen::Index i = 0; i <= k; ++i) barycentre += x_.Vertex(ids[i]);
+    const double distance2 = (barycentre / static_cast<double>(k + 1) - probe.x).squaredNorm();
+    if (distance2 >= nearest) continue;
+    nearest = distance2;
+    under = ids;
+  }
+  const auto guess = x_.Tangents(probe.nearest.vertex);
+  if (!under) return guess;
+  Eigen::MatrixXd edges(x_.mesh.d, k);
+  for (Eigen::Index i = 0; i < k; ++i) edges.col(i) = x_.Vertex(under[i + 1]) - x_.Vertex(under[0]);
+  const Eigen::VectorXd share = LeastSquares(edges, probe.x - x_.Vertex(under[0]));
+  Eigen::MatrixXd sum = Eigen::MatrixXd::Zero(x_.mesh.d, k);
+  for (Eigen::Index i = 0; i <= k; ++i) {
+    const auto tangents = x_.Tangents(under[i]);
+    sum += (i == 0 ? 1 - share.sum() : share[i - 1]) * tangents * (tangents.transpose() * guess);
+  }
+  return OrthonormalBasis(sum, k);
+}
+
+// Turns what the vertices near a probe know of its tangent space by what the one normal that its
+// answer tells is off, if it is little.
+void CoverageClaims::ReadTangent(Probe* probe) const {
+  const Eigen::VectorXd step = probe->asked - probe->x;
+  if (!(step.norm() > kErrorsInNormal * x_.position_error)) return;
+  const Eigen::VectorXd normal = step.normalized();
+  const Eigen::MatrixXd near = TangentsNear(*probe);
+  const Eigen::VectorXd off = near.transpose() * normal;
+  if (off.norm() > (x_.mesh.d == x_.mesh.k + 1 ? kMostOffAlone : kMostOff)) return;
+  const Eigen::MatrixXd basis = OrthonormalBasis(near - normal * off.transpose(), x_.mesh.k);
+  probe->tangent.assign(basis.data(), basis.data() + basis.size());
+  probe->knows_tangent = true;
 }
 
 // The derivative of the closest-point map at a point of M is the projection on the tangent space:
 // small steps along the nearest vertex's tangents come back as tangents of the point.
 Eigen::MatrixXd CoverageClaims::DifferenceQuestions() const {
   const Eigen::Index k = x_.mesh.k;
-  Eigen::MatrixXd points(x_.mesh.d, static_cast<Eigen::Index>(probes_.size()) * k);
-  for (std::size_t n = 0; n < probes_.size(); ++n) {
-    for (Eigen::Index a = 0; a < k; ++a) {
-      auto point = points.col(static_cast<Eigen::Index>(n) * k + a);
-      point = probes_[n].x;
-      for (int i = 0; i < x_.mesh.d; ++i) {
-        point[i] += kDifferenceStep * x_.size *
-                    probes_[n].tangent[static_cast<std::size_t>(a * x_.mesh.d + i)];
-      }
-    }
+  const auto open = std::count_if(probes_.begin(), probes_.end(),
+                                  [](const Probe& p) { return !p.knows_tangent; });
+  Eigen::MatrixXd points(x_.mesh.d, open * k);
+  Eigen::Index next = 0;
+  for (const Probe& probe : probes_) {
+    if (probe.knows_tangent) continue;
+    const Eigen::Map<const Eigen::MatrixXd> tangents(probe.tangent.data(), x_.mesh.d, k);
+    points.middleCols(next, k) = (kDifferenceStep * x_.size * tangents).colwise() + probe.x;
+    next += k;
   }
   return points;
 }
 
 void CoverageClaims::JudgeDifferences(const AnswerBlock& answer) {
   const Eigen::Index k = x_.mesh.k;
-  for (std::size_t n = 0; n < probes_.size(); ++n) {
-    Eigen::MatrixXd steps(x_.mesh.d, k);
+  Eigen::Index next = 0;
+  for (Probe& probe : probes_) {
+    if (probe.knows_tangent) continue;
+    const Eigen::Index first = std::exchange(next, next + k);
     bool complete = true;
-    for (Eigen::Index a = 0; a < k; ++a) {
-      const Eigen::Index j = static_cast<Eigen::Index>(n) * k + a;
-      complete = complete && Found(answer, j);
-      if (complete) steps.col(a) = answer.points.col(j) - probes_[n].x;
-    }
+    for (Eigen::Index a = 0; a < k; ++a) complete = complete && Found(answer, first + a);
     if (!complete) continue;  // the nearest vertex's tangents are used
-    const Eigen::MatrixXd basis = OrthonormalBasis(steps, k);
-    for (int i = 0; i < x_.mesh.d; ++i) {
-      for (Eigen::Index a = 0; a < k; ++a)
-        probes_[n].tangent[static_cast<std::size_t>(a * x_.mesh.d + i)] = basis(i, a);
-    }
+    const Eigen::MatrixXd basis =
+        OrthonormalBasis(answer.points.middleCols(first, k).colwise() - probe.x, k);
+    probe.tangent.assign(basis.data(), basis.data() + basis.size());
+    NoteOffset(probe);
   }
   JudgeFibres();
 }

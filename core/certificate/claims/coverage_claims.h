@@ -20,8 +20,8 @@ class CoverageClaims {
 
   Eigen::MatrixXd ProbeQuestions() const;
   void JudgeProbes(const Eigen::MatrixXd& asked, const AnswerBlock& answer);
-  // Returns steps around the probes' closest points, whose differences give tangents; empty if the
-  // oracle gives tangents itself.
+  // Returns steps around the probes' closest points whose tangent spaces are not known yet: the
+  // differences give them. Empty if there are none.
   Eigen::MatrixXd DifferenceQuestions() const;
   void JudgeDifferences(const AnswerBlock& answer);
 
@@ -34,7 +34,12 @@ class CoverageClaims {
     Eigen::VectorXd x;
     NearestVertex nearest;
     std::vector<double> tangent;  // k x d, C order
+    bool knows_tangent = false;   // or it is the nearest vertex's
+    Eigen::VectorXd asked;        // where the query was that found it
   };
+  void ReadTangent(Probe* probe) const;
+  void NoteOffset(const Probe& probe);
+  Eigen::MatrixXd TangentsNear(const Probe& probe) const;
   void JudgeFibres();
   bool IsBeyondFacet(const Eigen::VectorXd& x, std::uint32_t vertex) const;
   void JudgeHits(const Probe& probe, const FibreHits& hits);

@@ -43,7 +43,7 @@ ReachClaims::ReachClaims(Examination& examination, const StarGeometry& stars)
   narrowest_ = {edge_p_, (x_.Vertex(edge_p_) - x_.Vertex(edge_q_)).norm()};
   if (x_.spec.declared_reach) TestDeclared(stars);
   if (x_.thorough()) feet_.emplace(x_.mesh, x_.longest_edge);
-  balls_.AddLadders(x_.spec.random_seed, kBallCount);
+  balls_.AddLargest(x_.spec.random_seed, kBallCount);
   const std::uint64_t step =
       x_.thorough() ? 1 : std::max<std::uint64_t>(kBallStride, x_.mesh.vertices / kMaxBallPairs);
   for (std::uint64_t v = 0; v < x_.mesh.vertices; v += step) {

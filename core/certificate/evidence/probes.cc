@@ -76,6 +76,12 @@ Eigen::VectorXd PointNearSimplex(const MeshView& mesh, const std::uint32_t* ids,
   return x + push * random.Uniform() * direction.normalized();
 }
 
+// How many random points of the client's box the run began with.
+std::uint64_t KnownOfBox(const Specification& spec) {
+  if (spec.seeds.cols() > 0) return 0;
+  return static_cast<std::uint64_t>(spec.box_seeds > 0 ? spec.box_seeds : kDefaultBoxSeeds);
+}
+
 MeshBox BoxOfPart(const MeshView& mesh, std::uint32_t begin, std::uint32_t end) {
   MeshBox box{PointOf(mesh, begin), PointOf(mesh, begin)};
   WithDimension(mesh.d, [&](auto known) {
@@ -130,13 +136,15 @@ std::vector<std::uint32_t> ChooseSimplices(const SimplexList& list, const MeshSh
 
 std::vector<std::uint32_t> ChooseVertices(std::uint32_t vertices, std::uint64_t random_seed) {
   std::vector<std::uint32_t> chosen;
-  if (vertices <= kMaxVertexProbes) {
+  const std::uint32_t count =
+      std::clamp(vertices / kVertexStride, kMinVertexProbes, kMaxVertexProbes);
+  if (vertices <= count) {
     chosen.resize(vertices);
     std::iota(chosen.begin(), chosen.end(), 0u);
     return chosen;
   }
   Random random(random_seed, kVertexStream);
-  for (std::uint32_t n = 0; n < kMaxVertexProbes; ++n) {
+  for (std::uint32_t n = 0; n < count; ++n) {
     chosen.push_back(static_cast<std::uint32_t>(random.Next() % vertices));
   }
   SortUnique(chosen);
@@ -166,22 +174,21 @@ Eigen::MatrixXd CoverageProbes(const Specification& spec, const MeshView& mesh,
   const double margin = kBoxMargin * (box.upper - box.lower).norm();
   box.lower.array() -= margin;
   box.upper.array() += margin;
-  const int kinds = spec.bounding_box ? 3 : 2;
-  const auto probe = [&](int kind) -> Eigen::VectorXd {
+  constexpr std::uint64_t kBoxOfClient = 2;
+  const std::uint64_t kinds = spec.bounding_box ? 3 : 2;
+  const auto probe = [&](std::uint64_t kind) -> Eigen::VectorXd {
     if (kind == 1) return PointInBox(box.lower, box.upper, random);
-    if (kind == 2) return PointInBox(spec.bounding_box->lower, spec.bounding_box->upper, random);
+    if (kind == kBoxOfClient)
+      return PointInBox(spec.bounding_box->lower, spec.bounding_box->upper, random);
     const auto s = static_cast<std::uint32_t>(random.Next() % list.size());
     return PointNearSimplex(mesh, list[s], push, random);
   };
+  const std::uint64_t each = std::max(kProbesOfAKind, mesh.vertices / (kVerticesAProbe * kinds));
   std::vector<Eigen::VectorXd> probes;
-  for (int kind = 0; kind < kinds; ++kind)
-    for (int n = 0; n < kProbesOfAKind; ++n) probes.push_back(probe(kind));
-  for (std::uint64_t n = probes.size(); n < mesh.vertices / kVerticesAProbe; ++n)
-    probes.push_back(probe(static_cast<int>(n % static_cast<std::uint64_t>(kinds))));
-  const Eigen::Index seeds = std::min<Eigen::Index>(spec.seeds.cols(), kProbesOfAKind);
-  for (Eigen::Index n = 0; n < seeds; ++n) {
-    probes.push_back(spec.seeds.col(n * spec.seeds.cols() / seeds));
-  }
+  for (std::uint64_t kind = 0; kind < kinds; ++kind)
+    for (std::uint64_t n = kind == kBoxOfClient ? std::min(each, KnownOfBox(spec)) : 0; n < each;
+         ++n)
+      probes.push_back(probe(kind));
 
   Eigen::MatrixXd result(mesh.d, static_cast<Eigen::Index>(probes.size()));
   for (std::size_t n = 0; n < probes.size(); ++n) result.col(n) = probes[n];

@@ -15,7 +15,6 @@ namespace {
 // A ball is queried at slightly less than the radius found: the centre of the ball that touches M
 // twice is on the medial axis, where oracles divide by zero.
 constexpr double kInside = 0.98;
-constexpr int kLadder = 6;
 constexpr double kMet = 1e-3;  // of the longest edge
 // Sine of the least error assumed of the tangent space at a point that is no vertex.
 constexpr double kTilt = 0.25;
@@ -43,15 +42,52 @@ bool ShrinkingBalls::AimAcross(const Eigen::MatrixXd& tangents, Random& random, 
   return true;
 }
 
-void ShrinkingBalls::AddLadders(std::uint64_t random_seed, int count) {
+// Takes the radius of a ball that touches M `across` from where it began.
+void ShrinkingBalls::Touch(Ball* ball, double radius, double across) {
+  const double coarseness = longest_edge_[ball->vertex] * std::numbers::inv_sqrt3 / radius;
+  coarseness_ = std::max(coarseness_, coarseness);
+  coarse_ += !ball->is_coarse && coarseness > kCoarse;
+  ball->is_coarse |= coarseness > kCoarse;
+  if (radius < reach_) {
+    reach_ = radius;
+    narrowest_ = ball->vertex;
+    distance_ = across;
+  }
+  ball->radius = kInside * radius;
+}
+
+void ShrinkingBalls::ShrinkToVertices(Ball* ball) {
+  const double edge = longest_edge_[ball->vertex];
+  const double* const p = mesh_.Point(ball->vertex);
+  const std::uint64_t step = std::max<std::uint64_t>(1, mesh_.vertices / kVerticesBesideBall);
+  double narrowest = ball->radius, across = 0;
+  for (std::uint64_t v = 0; v < mesh_.vertices; v += step) {
+    const double* const q = mesh_.Point(static_cast<std::uint32_t>(v));
+    double along = 0, distance2 = 0;
+    for (int i = 0; i < mesh_.d; ++i) {
+      along += ball->normal[i] * (q[i] - p[i]);
+      distance2 += (q[i] - p[i]) * (q[i] - p[i]);
+    }
+    // Vertices are farther apart than the oracle's error.
+    if (!(along > 0) || !IsTelling(std::sqrt(distance2), along, edge, 0)) continue;
+    const double radius = ReachBound(distance2, along);
+    if (radius >= narrowest) continue;
+    narrowest = radius;
+    across = std::sqrt(distance2);
+  }
+  if (across > 0) Touch(ball, narrowest, across);
+}
+
+void ShrinkingBalls::AddLargest(std::uint64_t random_seed, int count) {
   const MeshBox box = BoxOf(mesh_);
   Random random(random_seed, 0x62616c6c73);
   for (int n = 0; n < count; ++n) {
     Ball ball;
     ball.vertex = static_cast<std::uint32_t>(random.Next() % mesh_.vertices);
-    ball.rungs = kLadder;
     ball.radius = (box.upper - box.lower).norm() / 2;
-    if (AimAcross(TangentsOf(ball.vertex), random, &ball)) Add(std::move(ball));
+    if (!AimAcross(TangentsOf(ball.vertex), random, &ball)) continue;
+    ShrinkToVertices(&ball);
+    Add(std::move(ball));
   }
 }
 
@@ -91,13 +127,9 @@ void ShrinkingBalls::AddBothSides(Ball ball, const Eigen::MatrixXd& tangents,
 }
 
 Eigen::MatrixXd ShrinkingBalls::Centres() const {
-  Eigen::Index count = 0;
-  for (const Ball& ball : active_) count += ball.rungs;
-  Eigen::MatrixXd centres(mesh_.d, count);
+  Eigen::MatrixXd centres(mesh_.d, static_cast<Eigen::Index>(active_.size()));
   Eigen::Index next = 0;
-  for (const Ball& ball : active_)
-    for (int rung = 0; rung < ball.rungs; ++rung)
-      centres.col(next++) = PointOf(ball) + std::ldexp(ball.radius, -rung) * ball.normal;
+  for (const Ball& ball : active_) centres.col(next++) = PointOf(ball) + ball.radius * ball.normal;
   return centres;
 }
 
@@ -106,36 +138,20 @@ void ShrinkingBalls::Absorb(const Eigen::MatrixXd& nearest, const std::vector<st
   std::vector<Ball> still;
   Eigen::Index next = 0;
   for (Ball& ball : active_) {
+    const Eigen::Index n = next++;
+    if (!found.empty() && !found[static_cast<std::size_t>(n)]) continue;
     const double edge = longest_edge_[ball.vertex];
-    double narrowest = std::numeric_limits<double>::infinity(), across = 0;
-    for (int rung = 0; rung < ball.rungs; ++rung) {
-      const Eigen::Index n = next++;
-      if (!found.empty() && !found[static_cast<std::size_t>(n)]) continue;
-      const Eigen::VectorXd offset = nearest.col(n) - PointOf(ball);
-      const double distance = offset.norm();
-      if (distance > kMet * edge)
-        met_.insert(met_.end(), nearest.col(n).begin(), nearest.col(n).end());
-      const bool exact = ball.point.size() == 0;
-      const double along = ball.normal.dot(offset) - ball.tilt * distance;
-      const double far = exact ? edge : std::numeric_limits<double>::infinity();
-      if (along <= 0 || !IsTelling(distance, along, far, position_error)) continue;
-      const double radius = ReachBound(distance * distance, along);
-      if (radius >= std::ldexp(ball.radius, -rung) || radius >= narrowest) continue;
-      narrowest = radius;
-      across = distance;
-    }
-    if (std::isinf(narrowest)) continue;
-    const double coarseness = edge * std::numbers::inv_sqrt3 / narrowest;
-    coarseness_ = std::max(coarseness_, coarseness);
-    coarse_ += !ball.is_coarse && coarseness > kCoarse;
-    ball.is_coarse |= coarseness > kCoarse;
-    if (narrowest < reach_) {
-      reach_ = narrowest;
-      narrowest_ = ball.vertex;
-      distance_ = across;
-    }
-    ball.rungs = 1;
-    ball.radius = kInside * narrowest;
+    const Eigen::VectorXd offset = nearest.col(n) - PointOf(ball);
+    const double distance = offset.norm();
+    if (distance > kMet * edge)
+      met_.insert(met_.end(), nearest.col(n).begin(), nearest.col(n).end());
+    const bool exact = ball.point.size() == 0;
+    const double along = ball.normal.dot(offset) - ball.tilt * distance;
+    const double far = exact ? edge : std::numeric_limits<double>::infinity();
+    if (along <= 0 || !IsTelling(distance, along, far, position_error)) continue;
+    const double radius = ReachBound(distance * distance, along);
+    if (radius >= ball.radius) continue;
+    Touch(&ball, radius, distance);
     still.push_back(std::move(ball));
   }
   active_ = std::move(still);

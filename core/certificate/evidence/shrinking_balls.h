@@ -19,7 +19,7 @@ namespace stellate::core {
 // enters it by no more than two hundredths of its radius.
 //
 //   ShrinkingBalls balls(mesh, longest_edge);
-//   balls.AddLadders(random_seed, count);
+//   balls.AddLargest(random_seed, count);
 //   for (Eigen::MatrixXd c = balls.Centres(); c.cols() > 0; c = balls.Centres())
 //     balls.Absorb(ClosestPoints(c), found, position_error);
 class ShrinkingBalls {
@@ -29,10 +29,10 @@ class ShrinkingBalls {
   ShrinkingBalls(const MeshView& mesh, const std::vector<double>& longest_edge)
       : mesh_(mesh), longest_edge_(longest_edge) {}
 
-  // Adds balls at random vertices, on random normals. Their first step queries a ladder of radii,
-  // each half of the one before, from half the mesh's width on: round trips cost more than queries,
-  // and one more step then suffices.
-  void AddLadders(std::uint64_t random_seed, int count);
+  // Adds balls at random vertices, on random normals, which begin as the largest that hold no other
+  // vertex, and are no wider than the mesh: vertices are points of M, too, so that only what is
+  // between or beside them is left to ask. A ball holds all smaller ones on its normal.
+  void AddLargest(std::uint64_t random_seed, int count);
   // Adds two balls of one radius on either side of vertex v.
   void AddPair(std::uint32_t v, double radius, std::uint64_t random_seed);
   // Adds two balls at a point of M under a simplex, near its first vertex, where `tangents` (d x k)
@@ -62,8 +62,7 @@ class ShrinkingBalls {
  private:
   struct Ball {
     std::uint32_t vertex = 0;
-    int rungs = 1;           // of the ladder that is queried next
-    double radius = 0;       // its first
+    double radius = 0;       // length
     Eigen::VectorXd point;   // that it touches; empty: the vertex
     Eigen::VectorXd normal;  // unit
     double tilt = 0;         // sine of the angle that the normal may be wrong by
@@ -77,6 +76,8 @@ class ShrinkingBalls {
     ++added_;
     active_.push_back(std::move(ball));
   }
+  void ShrinkToVertices(Ball* ball);
+  void Touch(Ball* ball, double radius, double across);
   bool AimAcross(const Eigen::MatrixXd& tangents, Random& random, Ball* ball) const;
   Eigen::MatrixXd TangentsOf(std::uint32_t v) const;
 

@@ -243,9 +243,10 @@ struct CertifiedRun {
 inline CertifiedRun Certify(
     const Specification& spec, const HandmadeMesh& mesh, const ClosestPoint& closest,
     StarFacts facts = {0, 0, true},
-    const std::function<Eigen::MatrixXd(const Eigen::VectorXd&)>& tangent = nullptr) {
+    const std::function<Eigen::MatrixXd(const Eigen::VectorXd&)>& tangent = nullptr,
+    KnownOfManifold known = {}) {
   CertifiedRun run;
-  Certifier certifier(spec, mesh.View(), facts);
+  Certifier certifier(spec, mesh.View(), facts, std::move(known));
   while (const std::vector<QueryBlock>* blocks = certifier.NextBlocks()) {
     ++run.rounds;
     std::vector<AnswerBlock> answers;

@@ -100,7 +100,7 @@ TEST(ProgressMeter, TellsTheShareOfTheQuestions) {
           << c.manifold << " round " << said.progress.round;
     }
     EXPECT_EQ(before, 1) << c.manifold;
-    EXPECT_GE(7 * foreseeable, all.size()) << c.manifold << ": known for a while";
+    EXPECT_GE(8 * foreseeable, all.size()) << c.manifold << ": known for a while";
     EXPECT_FALSE(all.back().progress.is_foreseeable) << "it is over";
   }
 }
