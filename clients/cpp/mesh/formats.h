@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -13,6 +14,9 @@
 #include "stellate/mesh.h"
 
 namespace stellate::client {
+
+// Points or cells that are in memory at a time, where they need not be.
+inline constexpr std::size_t kBlockRows = std::size_t{1} << 14;
 
 // The walls of points, as bits: the ids, ascending, of those that are on some.
 struct PointWalls {

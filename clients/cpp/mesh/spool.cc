@@ -13,8 +13,6 @@ namespace {
 
 using Eigen::Index;
 
-constexpr std::size_t kRows = std::size_t{1} << 14;  // that are read back at a time
-
 tl::unexpected<Error> CannotUse(const std::string& folder, int why) {
   return Fail(ErrorCode::kFileFailed,
               "cannot write a file without a name in " + folder + ": " + std::strerror(why));
@@ -145,8 +143,8 @@ std::vector<Group> Spool::Groups() const {
 Expected<void> Spool::EachPoints(
     const std::function<Expected<void>(const Eigen::MatrixXd&)>& take) const {
   const std::uint64_t row = sizeof(double) * static_cast<std::uint64_t>(d_);
-  for (std::uint64_t place = 0; place < points_.size(); place += kRows * row) {
-    const std::uint64_t bytes = std::min(kRows * row, points_.size() - place);
+  for (std::uint64_t place = 0; place < points_.size(); place += kBlockRows * row) {
+    const std::uint64_t bytes = std::min(kBlockRows * row, points_.size() - place);
     Eigen::MatrixXd block(d_, static_cast<Index>(bytes / row));
     if (auto ok = points_.ReadAt(place, reinterpret_cast<char*>(block.data()), bytes); !ok)
       return ok;
@@ -158,8 +156,8 @@ Expected<void> Spool::EachPoints(
 Expected<void> Spool::EachCells(
     int label, const std::function<Expected<void>(const SimplexMatrix&)>& take) const {
   const std::uint64_t row = sizeof(std::uint32_t) * static_cast<std::uint64_t>(k_ + 2);
-  for (std::uint64_t place = 0; place < cells_.size(); place += kRows * row) {
-    const std::uint64_t bytes = std::min(kRows * row, cells_.size() - place);
+  for (std::uint64_t place = 0; place < cells_.size(); place += kBlockRows * row) {
+    const std::uint64_t bytes = std::min(kBlockRows * row, cells_.size() - place);
     SimplexMatrix block(k_ + 2, static_cast<Index>(bytes / row));
     if (auto ok = cells_.ReadAt(place, reinterpret_cast<char*>(block.data()), bytes); !ok)
       return ok;

@@ -15,8 +15,6 @@
 namespace stellate::client {
 namespace {
 
-constexpr std::size_t kRows = std::size_t{1} << 14;  // at a time, of what is not given in blocks
-
 std::string Base64(std::string_view bytes) {
   constexpr std::string_view kDigits =
       "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
@@ -140,7 +138,7 @@ class VtuWriter final : public MeshWriter {
   Expected<void> AddCells(std::size_t /*group*/,
                           const Eigen::Ref<const SimplexMatrix>& cells) override {
     if (auto ok = AddWalls(); !ok) return ok;
-    constexpr auto kCols = static_cast<Eigen::Index>(kRows);
+    constexpr auto kCols = static_cast<Eigen::Index>(kBlockRows);
     for (Eigen::Index first = 0; first < cells.cols(); first += kCols) {
       const Eigen::Matrix<std::int64_t, Eigen::Dynamic, Eigen::Dynamic> ids =
           cells.middleCols(first, std::min(kCols, cells.cols() - first)).cast<std::int64_t>();
@@ -245,8 +243,8 @@ class VtuWriter final : public MeshWriter {
     if (!arrays_[kPointWalls].is_there || arrays_[kPointWalls].is_begun) return {};
     const PointWalls& walls = *shape_.walls;
     std::size_t next = 0;
-    for (std::uint64_t first = 0; first < shape_.vertices; first += kRows) {
-      const std::uint64_t last = std::min(shape_.vertices, first + kRows);
+    for (std::uint64_t first = 0; first < shape_.vertices; first += kBlockRows) {
+      const std::uint64_t last = std::min(shape_.vertices, first + kBlockRows);
       std::vector<std::uint64_t> block(last - first);
       for (; next < walls.on.size() && walls.on[next] < last; ++next)
         block[walls.on[next] - first] = walls.bits[next];
@@ -271,7 +269,7 @@ class VtuWriter final : public MeshWriter {
       const Group* const group = groups_ == nullptr ? nullptr : &(*groups_)[g];
       for (std::uint64_t j = 0; j < cells.count; ++j) {
         block.push_back(row(static_cast<std::size_t>(cells.dimension) + 1, group, j));
-        if (block.size() < kRows) continue;
+        if (block.size() < kBlockRows) continue;
         if (auto ok = flush(); !ok) return ok;
       }
     }
