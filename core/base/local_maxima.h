@@ -23,7 +23,6 @@ class LocalMaxima {
       : count_(count),
         visit_stronger_(visit_stronger),
         state_(std::make_unique<std::atomic<State>[]>(count)) {
-    for (std::size_t i = 0; i < count; ++i) Set(i, kOpen);
     std::vector<std::size_t> open = LeftOpen(count, [](std::size_t i) { return i; });
     for (int pass = 1; pass < kMostPasses && !open.empty(); ++pass)
       open = LeftOpen(open.size(), [&](std::size_t at) { return open[at]; });
@@ -35,12 +34,14 @@ class LocalMaxima {
 
   std::vector<std::uint8_t> Chosen() const {
     std::vector<std::uint8_t> chosen(count_);
-    for (std::size_t i = 0; i < count_; ++i) chosen[i] = Get(i) == kChosen;
+    ParallelRanges(count_, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) chosen[i] = Get(i) == kChosen;
+    });
     return chosen;
   }
 
  private:
-  enum State : std::uint8_t { kRefused, kChosen, kOpen };
+  enum State : std::uint8_t { kOpen, kRefused, kChosen };
   // Passes are few where strengths are as good as random; long chains are followed one by one.
   static constexpr int kMostPasses = 32;
 

@@ -16,8 +16,8 @@ double ReachOfRuns(int d) { return d <= 3 ? 6 : 4; }
 }  // namespace
 
 // One search a run, and then point by point.
-NearLists::NearLists(const std::vector<double>& points, int d, double radius,
-                     const std::vector<double>& shares)
+NearLists::NearLists(std::span<const double> points, int d, double radius,
+                     std::span<const double> shares)
     : spans_(points.size() / static_cast<std::size_t>(d)) {
   const RunTree tree(points, d, ReachOfRuns(d) * radius, shares);
   const Runs& runs = tree.runs();

@@ -4,6 +4,8 @@
 #include <span>
 #include <vector>
 
+#include "core/base/unset.h"
+
 namespace stellate::core {
 
 // Lists, for each of many points, the others that are near it. Built in parallel; the same for any
@@ -12,8 +14,8 @@ class NearLists {
  public:
   // `points`: d each. Two points are near if their distance is below `radius`, times the smaller of
   // their `shares` if these are given (one a point).
-  NearLists(const std::vector<double>& points, int d, double radius,
-            const std::vector<double>& shares = {});
+  NearLists(std::span<const double> points, int d, double radius,
+            std::span<const double> shares = {});
 
   std::size_t size() const { return spans_.size(); }
   // Ascending; i is not among them.
@@ -24,10 +26,10 @@ class NearLists {
 
  private:
   struct Span {
-    std::uint32_t list = 0, begin = 0, count = 0;
+    std::uint32_t list, begin, count;
   };
   std::vector<std::vector<std::uint32_t>> lists_;
-  std::vector<Span> spans_;  // by point
+  UnsetVector<Span> spans_;  // by point
 };
 
 }  // namespace stellate::core

@@ -11,6 +11,36 @@ namespace {
 constexpr std::size_t kMostPoints = 32;
 // More than rounding can take from a distance in R^d, d up to thousands.
 constexpr double kRoundedUp = 1 + 1e-12;
+// Points of a stretch that is cut into runs on its own.
+constexpr std::size_t kStretch = 4096;
+
+// Returns 0, next(0), next(next(0)) and so on, as far as they are below `count`. Follows chains
+// from the beginnings of all stretches in parallel: the whole one mostly meets each soon, and is
+// the same from there on.
+template <typename Next>
+std::vector<std::size_t> Chain(std::size_t count, const Next& next) {
+  std::vector<std::vector<std::size_t>> chains((count + kStretch - 1) / kStretch);
+  ParallelFor(chains.size(), [&](std::size_t s) {
+    const std::size_t last = std::min(count, (s + 1) * kStretch);
+    for (std::size_t i = s * kStretch; i < last; i = next(i)) chains[s].push_back(i);
+  });
+  std::vector<std::size_t> whole;
+  std::size_t i = 0;
+  for (std::size_t s = 0; s < chains.size(); ++s) {
+    CheckInterruption(s);
+    const std::size_t last = std::min(count, (s + 1) * kStretch);
+    auto met = chains[s].begin();
+    for (; i < last; i = next(i)) {
+      met = std::lower_bound(met, chains[s].end(), i);
+      if (met != chains[s].end() && *met == i) break;
+      whole.push_back(i);
+    }
+    if (i >= last) continue;
+    whole.insert(whole.end(), met, chains[s].end());
+    i = next(whole.back());
+  }
+  return whole;
+}
 
 }  // namespace
 
@@ -18,13 +48,14 @@ Runs::Runs(std::span<const double> points, int d, double reach, std::span<const 
     : stride_(static_cast<std::size_t>(d)) {
   const std::size_t count = points.size() / stride_;
   const auto at = [&](std::size_t i) { return points.data() + i * stride_; };
-  for (std::size_t begin = 0, end; begin < count; begin = end) {
-    CheckInterruption(begins_.size());
-    begins_.push_back(begin);
+  begins_ = Chain(count, [&](std::size_t begin) {
     const double far = shares.empty() ? reach : reach * shares[begin];
-    for (end = begin + 1; end < count && end < begin + kMostPoints; ++end)
-      if (!(SquaredDistance(at(begin), at(end), d) <= far * far)) break;
-  }
+    std::size_t end = begin + 1;
+    while (end < count && end < begin + kMostPoints &&
+           SquaredDistance(at(begin), at(end), d) <= far * far)
+      ++end;
+    return end;
+  });
   centres_.assign(begins_.size() * stride_, 0.0);
   radii_.assign(begins_.size(), 0.0);
   begins_.push_back(count);

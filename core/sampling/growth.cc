@@ -3,11 +3,14 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 #include "core/base/dense.h"
 #include "core/base/local_maxima.h"
 #include "core/base/parallel.h"
+#include "core/base/parallel_copy.h"
+#include "core/base/parallel_select.h"
 #include "core/index/near_lists.h"
 #include "core/sampling/lattice.h"
 
@@ -23,7 +26,7 @@ constexpr double kLeastVolume = 0.1;
 constexpr double RunReach(int k) { return k < 3 ? 4 : 1.5; }
 // A lattice whose sizes differ by more than this factor from the expected ones costs more than it
 // saves.
-constexpr double kUnexpected = 1.25;
+constexpr double kMostOff = 1.25;
 // So many answers decide whether the lattice is worth while: if more than this share is not as
 // expected, sizes change within a spacing.
 constexpr std::uint64_t kTelling = 256;
@@ -51,29 +54,43 @@ bool Align(const double* tangent, int d, double* frame) {
 }  // namespace
 
 template <int K>
-void Growth<K>::Sites::Append(const Sites& others) {
-  points.insert(points.end(), others.points.begin(), others.points.end());
-  frames.insert(frames.end(), others.frames.begin(), others.frames.end());
-  changes.insert(changes.end(), others.changes.begin(), others.changes.end());
-  shares.insert(shares.end(), others.shares.begin(), others.shares.end());
-  patch.insert(patch.end(), others.patch.begin(), others.patch.end());
-  name.insert(name.end(), others.name.begin(), others.name.end());
+void Growth<K>::Sites::Resize(std::size_t count, std::size_t stride, bool predicts) {
+  points.resize(count * stride);
+  frames.resize(count * stride * K);
+  changes.resize(predicts ? count * stride * (K + 1) : 0);
+  shares.resize(count);
+  patch.resize(count);
+  name.resize(count);
+}
+
+template <int K>
+template <typename Column>
+void Growth<K>::Sites::Put(std::size_t at, const Sites& others,
+                           const std::vector<Column>& columns) {
+  const std::size_t stride = others.size() == 0 ? 0 : others.points.size() / others.size();
+  const std::size_t change_stride = others.changes.empty() ? 0 : stride * (K + 1);
+  ParallelFor(columns.size(), [&](std::size_t i) {
+    const auto from = static_cast<std::size_t>(columns[i]), to = at + i;
+    const auto copy = [&](const Numbers& source, std::size_t each, Numbers* target) {
+      std::copy_n(source.data() + from * each, each, target->data() + to * each);
+    };
+    copy(others.points, stride, &points);
+    copy(others.frames, stride * K, &frames);
+    copy(others.changes, change_stride, &changes);
+    shares[to] = others.shares[from];
+    patch[to] = others.patch[from];
+    name[to] = others.name[from];
+  });
 }
 
 template <int K>
 Growth<K>::Proposed::Proposed(std::size_t count, std::size_t stride, bool predicts)
     : parents(count), clear(count) {
-  sites.points.resize(count * stride);
-  sites.frames.resize(count * stride * K);
-  if (predicts) sites.changes.resize(count * stride * (K + 1));
-  sites.shares.resize(count);
-  sites.patch.resize(count);
-  sites.name.resize(count);
+  sites.Resize(count, stride, predicts);
 }
 
 template <int K>
-Growth<K>::Layer::Layer(int d, std::vector<double> placed, std::vector<double> its_shares,
-                        double reach)
+Growth<K>::Layer::Layer(int d, Numbers placed, Numbers its_shares, double reach)
     : points(std::move(placed)), shares(std::move(its_shares)), tree(points, d, reach, shares) {}
 
 template <int K>
@@ -87,13 +104,13 @@ Growth<K>::Growth(int d, double spacing, bool predicts)
 }
 
 template <int K>
-Runs Growth<K>::RunsOf(const std::vector<double>& points, const std::vector<double>& shares) const {
+Runs Growth<K>::RunsOf(const Numbers& points, const Numbers& shares) const {
   return Runs(points, d_, RunReach(K) * spacing_, shares);
 }
 
 // Gathers the sampled points within their share of `radius` of some point of the run, and more.
 template <int K>
-void Growth<K>::GatherPlaced(const Runs& runs, std::size_t run, const std::vector<double>& shares,
+void Growth<K>::GatherPlaced(const Runs& runs, std::size_t run, const Numbers& shares,
                              double radius, Placed* near) const {
   near->points.clear();
   near->shares.clear();
@@ -114,8 +131,7 @@ void Growth<K>::GatherPlaced(const Runs& runs, std::size_t run, const std::vecto
 }
 
 template <int K>
-std::vector<std::uint8_t> Growth<K>::AreFarFromPlaced(const std::vector<double>& points,
-                                                      const std::vector<double>& shares,
+std::vector<std::uint8_t> Growth<K>::AreFarFromPlaced(const Numbers& points, const Numbers& shares,
                                                       double distance) const {
   std::vector<std::uint8_t> far(points.size() / stride(), 1);
   const Runs runs = RunsOf(points, shares);
@@ -137,78 +153,67 @@ std::vector<std::uint8_t> Growth<K>::AreFarFromPlaced(const std::vector<double>&
   return far;
 }
 
+template <int K>
+typename Growth<K>::Candidates Growth<K>::CandidatesOf(const Eigen::MatrixXd& points,
+                                                       std::span<const double> shares,
+                                                       std::vector<std::uint32_t> columns) const {
+  Candidates candidates{std::move(columns), {}, {}};
+  const std::vector<std::uint32_t>& of = candidates.columns;
+  candidates.points.resize(of.size() * stride());
+  candidates.shares.resize(of.size());
+  ParallelFor(of.size(), [&](std::size_t i) {
+    std::copy_n(points.col(of[i]).data(), d_, candidates.points.data() + i * stride());
+    candidates.shares[i] = shares.empty() ? 1 : shares[of[i]];
+  });
+  return candidates;
+}
+
 // Returns which candidates keep their distance from the sample: a candidate near a place that was
 // clear of all points needs no search.
 template <int K>
-std::vector<std::uint8_t> Growth<K>::AreFree(const std::vector<double>& candidates,
-                                             const std::vector<double>& shares,
-                                             const Proposed& proposed,
-                                             const std::vector<std::uint32_t>& columns) const {
+std::vector<std::uint8_t> Growth<K>::AreFree(const Candidates& candidates,
+                                             const Proposed& proposed) const {
   const double keep = kKeep * spacing_;
-  std::vector<std::uint8_t> free(columns.size(), 1);
-  std::vector<std::uint32_t> open;
-  std::vector<double> points, own;
-  for (std::uint32_t i = 0; i < columns.size(); ++i) {
-    CheckInterruption(i);
-    const double* const y = candidates.data() + i * stride();
-    const double* const asked = proposed.sites.points.data() + columns[i] * stride();
-    const double clear = proposed.clear[columns[i]] - Distance(y, asked, d_);
-    if (clear > kSurely * (keep * shares[i])) continue;
-    open.push_back(i);
-    points.insert(points.end(), y, y + d_);
-    own.push_back(shares[i]);
-  }
+  const std::vector<std::uint32_t>& columns = candidates.columns;
+  const auto at = [&](std::size_t i) { return candidates.points.data() + i * stride(); };
+  const std::vector<std::uint32_t> open =
+      ParallelGather<std::uint32_t>(columns.size(), [&](std::size_t i, auto* found) {
+        const double* const asked = proposed.sites.points.data() + columns[i] * stride();
+        const double clear = proposed.clear[columns[i]] - Distance(at(i), asked, d_);
+        if (!(clear > kSurely * (keep * candidates.shares[i])))
+          found->push_back(static_cast<std::uint32_t>(i));
+      });
+  Numbers points(open.size() * stride()), own(open.size());
+  ParallelFor(open.size(), [&](std::size_t i) {
+    std::copy_n(at(open[i]), d_, points.data() + i * stride());
+    own[i] = candidates.shares[open[i]];
+  });
   const std::vector<std::uint8_t> far = AreFarFromPlaced(points, own, keep);
-  for (std::size_t i = 0; i < open.size(); ++i) free[open[i]] = far[i];
+  std::vector<std::uint8_t> free(columns.size(), 1);
+  ParallelFor(open.size(), [&](std::size_t i) { free[open[i]] = far[i]; });
   return free;
 }
 
-// Chooses, of the answers `candidates` to proposals, d each, with their shares, in the order of
-// `columns`, those that keep their distance from the sample and from each other. Proposals of more
-// parents come first: they are more likely at their place in the lattice.
+// Chooses those of the candidates that keep their distance from the sample and from each other, and
+// returns their places, ascending. Proposals of more parents come first: they are more likely at
+// their place in the lattice.
 template <int K>
-std::vector<std::uint32_t> Growth<K>::Choose(const std::vector<double>& candidates,
-                                             const std::vector<double>& shares,
-                                             const Proposed& proposed,
-                                             const std::vector<std::uint32_t>& columns) const {
-  const double keep = kKeep * spacing_;
-  const std::vector<std::uint8_t> far = AreFree(candidates, shares, proposed, columns);
-  const NearLists near(candidates, d_, keep, shares);
+std::vector<std::uint32_t> Growth<K>::Choose(const Candidates& candidates,
+                                             const Proposed& proposed) const {
+  const std::size_t count = candidates.columns.size();
+  const std::vector<std::uint8_t> far = AreFree(candidates, proposed);
+  const NearLists near(candidates.points, d_, kKeep * spacing_, candidates.shares);
   const auto strength = [&](std::uint32_t i) {
-    const std::uint32_t c = columns[i];
+    const std::uint32_t c = candidates.columns[i];
     return std::pair(-static_cast<int>(proposed.parents[c]), i);
   };
   const std::vector<std::uint8_t> chosen =
-      ChooseLocalMaxima(columns.size(), [&](std::size_t i, const auto& visit) {
+      ChooseLocalMaxima(count, [&](std::size_t i, const auto& visit) {
         if (!far[i]) return;
         for (const std::uint32_t j : near.Of(i))
           if (far[j] && strength(j) < strength(static_cast<std::uint32_t>(i)) && !visit(j)) return;
       });
-  std::vector<std::uint32_t> taken;
-  for (std::uint32_t i = 0; i < columns.size(); ++i) {
-    CheckInterruption(i);
-    if (chosen[i] && far[i]) taken.push_back(i);
-  }
-  return taken;
-}
-
-template <int K>
-typename Growth<K>::Sites Growth<K>::SitesOf(const Proposed& proposed,
-                                             const std::vector<std::uint32_t>& columns) const {
-  Sites sites;
-  for (const std::uint32_t c : columns) {
-    CheckInterruption(sites.size());
-    const double* const point = proposed.sites.points.data() + c * stride();
-    const double* const frame = proposed.sites.frames.data() + c * stride() * K;
-    sites.points.insert(sites.points.end(), point, point + stride());
-    sites.frames.insert(sites.frames.end(), frame, frame + stride() * K);
-    const double* const change = proposed.sites.changes.data() + c * change_stride();
-    sites.changes.insert(sites.changes.end(), change, change + change_stride());
-    sites.shares.push_back(proposed.sites.shares[c]);
-    sites.patch.push_back(proposed.sites.patch[c]);
-    sites.name.push_back(proposed.sites.name[c]);
-  }
-  return sites;
+  return ParallelSelect(count, [&](std::size_t i) { return chosen[i] && far[i]; });
 }
 
 template <int K>
@@ -217,15 +222,23 @@ typename Growth<K>::Ring Growth<K>::Propose() {
                                                    kMostUnexpected * static_cast<double>(answered_);
   asked_ = is_lost ? Proposed() : Merge(ByPlace(FreePlaces()));
   border_ = {};
-  const auto count = static_cast<Eigen::Index>(asked_.sites.size());
-  Ring ring{Eigen::Map<const Eigen::MatrixXd>(asked_.sites.points.data(), d_, count),
-            Eigen::Map<const Eigen::MatrixXd>(asked_.sites.frames.data(), d_ * K, count),
-            {}};
+  const Sites& sites = asked_.sites;
+  const auto count = static_cast<Eigen::Index>(sites.size());
+  const auto copy = [count](const Numbers& from, Eigen::Index rows) {
+    Eigen::MatrixXd to(rows, count);
+    ParallelCopy(from.data(), from.size(), to.data());
+    return to;
+  };
+  Ring ring{copy(sites.points, d_), copy(sites.frames, d_ * K), {}};
   if (!predicts_) return ring;
-  const Eigen::Map<const Eigen::MatrixXd> changes(asked_.sites.changes.data(), d_ * (K + 1), count);
-  ring.bends = changes.topRows(d_);
-  ring.tangents += changes.bottomRows(d_ * K);
-  ring.spacing = spacing_ * Eigen::Map<const Eigen::VectorXd>(asked_.sites.shares.data(), count);
+  ring.bends.resize(d_, count);
+  ring.spacing.resize(count);
+  const Eigen::Map<const Eigen::MatrixXd> changes(sites.changes.data(), d_ * (K + 1), count);
+  ParallelFor(count, [&](Eigen::Index i) {
+    ring.bends.col(i) = changes.col(i).head(d_);
+    ring.tangents.col(i) += changes.col(i).tail(d_ * K);
+    ring.spacing[i] = spacing_ * sites.shares[static_cast<std::size_t>(i)];
+  });
   return ring;
 }
 
@@ -240,16 +253,6 @@ void Growth<K>::NoteChange(std::size_t asked, const double* point, const double*
     change[stride() + j] = frame[j] - proposed_frame[j];
 }
 
-// Keeps the share of the answer to query `asked`, if it is about as expected.
-template <int K>
-bool Growth<K>::IsExpected(std::size_t asked, double share) {
-  const double expected = std::exchange(asked_.sites.shares[asked], share);
-  const bool is = share <= kUnexpected * expected && expected <= kUnexpected * share;
-  ++answered_;
-  unexpected_ += !is;
-  return is;
-}
-
 template <int K>
 void Growth<K>::Forget() {
   layers_.clear();
@@ -260,21 +263,38 @@ void Growth<K>::Forget() {
 // Appends sites to the sample, which grows on from them.
 template <int K>
 void Growth<K>::Carry(Sites sites) {
-  border_.Append(sites);
   size_ += static_cast<std::uint32_t>(sites.size());
   if (sites.size() == 0) return;
-  std::vector<double> points = std::move(sites.points), shares = std::move(sites.shares);
-  const auto append = [](std::vector<double>* to, std::vector<double>* from) {
-    to->insert(to->end(), from->begin(), from->end());
-    *from = std::move(*to);
+  std::size_t first = layers_.size(), count = sites.size();
+  while (first > 0 && kLayerGrowth * count >= layers_[first - 1]->shares.size())
+    count += layers_[--first]->shares.size();
+  Numbers points(count * stride()), shares(count);
+  std::size_t at = 0;
+  const auto append = [&](const Numbers& its_points, const Numbers& its_shares) {
+    ParallelCopy(its_points.data(), its_points.size(), points.data() + at * stride());
+    ParallelCopy(its_shares.data(), its_shares.size(), shares.data() + at);
+    at += its_shares.size();
   };
-  while (!layers_.empty() && kLayerGrowth * points.size() >= layers_.back()->points.size()) {
-    append(&layers_.back()->points, &points);
-    append(&layers_.back()->shares, &shares);
-    layers_.pop_back();
-  }
+  for (std::size_t l = first; l < layers_.size(); ++l)
+    append(layers_[l]->points, layers_[l]->shares);
+  append(sites.points, sites.shares);
+  layers_.resize(first);
   layers_.push_back(
       std::make_unique<Layer>(d_, std::move(points), std::move(shares), RunReach(K) * spacing_));
+  if (border_.size() == 0) {
+    border_ = std::move(sites);
+    return;
+  }
+  std::vector<std::uint32_t> all(sites.size());
+  std::iota(all.begin(), all.end(), 0u);
+  const std::size_t before = border_.size();
+  Sites both;
+  both.Resize(before + all.size(), stride(), predicts_);
+  both.Put(before, sites, all);
+  all.resize(before);
+  std::iota(all.begin(), all.end(), 0u);
+  both.Put(0, border_, all);
+  border_ = std::move(both);
 }
 
 template <int K>
@@ -283,35 +303,76 @@ std::vector<Eigen::Index> Growth<K>::Begin(const Eigen::MatrixXd& points,
                                            const std::vector<std::uint8_t>& found, double apart,
                                            const Eigen::VectorXd& shares, double clearance) {
   is_graded_ = is_graded_ || shares.size() > 0;
-  std::vector<Eigen::Index> columns;
-  std::vector<double> candidates, own;
-  for (Eigen::Index c = 0; c < points.cols(); ++c) {
-    CheckInterruption(static_cast<std::size_t>(c));
-    if (!found[static_cast<std::size_t>(c)]) continue;
-    columns.push_back(c);
-    candidates.insert(candidates.end(), points.col(c).begin(), points.col(c).end());
-    own.push_back(shares.size() > 0 ? shares[c] : 1);
+  std::vector<std::uint32_t> answered;
+  for (std::uint32_t c = 0; c < points.cols(); ++c) {
+    CheckInterruption(c);
+    if (found[c]) answered.push_back(c);
   }
-  const std::vector<std::uint8_t> far = AreFarFromPlaced(candidates, own, clearance * spacing_);
-  Sites seeds;
-  BallTree tree(d_, &seeds.points);
-  std::vector<Eigen::Index> begun;
-  for (std::size_t i = 0; i < columns.size(); ++i) {
+  const std::span<const double> given(shares.data(), static_cast<std::size_t>(shares.size()));
+  const Candidates candidates = CandidatesOf(points, given, std::move(answered));
+  const std::vector<std::uint8_t> far =
+      AreFarFromPlaced(candidates.points, candidates.shares, clearance * spacing_);
+  std::vector<double> begun;
+  BallTree tree(d_, &begun);
+  std::vector<std::size_t> seeds;
+  for (std::size_t i = 0; i < far.size(); ++i) {
     CheckInterruption(i);
-    const double* const y = candidates.data() + i * stride();
-    if (!far[i] || tree.AnyWithin(y, own[i] * apart)) continue;
-    begun.push_back(columns[i]);
-    seeds.points.insert(seeds.points.end(), y, y + d_);
+    const double* const y = candidates.points.data() + i * stride();
+    if (!far[i] || tree.AnyWithin(y, candidates.shares[i] * apart)) continue;
+    seeds.push_back(i);
+    begun.insert(begun.end(), y, y + d_);
     tree.Insert(0);
-    const auto frame = tangents.col(columns[i]);
-    seeds.frames.insert(seeds.frames.end(), frame.begin(), frame.end());
-    seeds.changes.resize(seeds.changes.size() + change_stride());
-    seeds.shares.push_back(own[i]);
-    seeds.patch.push_back(patches_++);
-    seeds.name.push_back(names_.origin());
   }
-  Carry(std::move(seeds));
-  return begun;
+  Sites sites;
+  sites.Resize(seeds.size(), stride(), predicts_);
+  std::copy(begun.begin(), begun.end(), sites.points.begin());
+  std::fill(sites.changes.begin(), sites.changes.end(), 0.0);
+  std::fill(sites.name.begin(), sites.name.end(), names_.origin());
+  std::vector<Eigen::Index> columns;
+  for (const std::size_t i : seeds) {
+    const std::size_t at = columns.size();
+    columns.push_back(candidates.columns[i]);
+    const auto frame = tangents.col(columns.back());
+    std::copy(frame.begin(), frame.end(), sites.frames.data() + at * stride() * K);
+    sites.shares[at] = candidates.shares[i];
+    sites.patch[at] = patches_++;
+  }
+  Carry(std::move(sites));
+  return columns;
+}
+
+// Turns frames to the tangent spaces of the answers, and keeps their shares.
+template <int K>
+std::vector<typename Growth<K>::Fit> Growth<K>::FitAnswers(const Eigen::MatrixXd& points,
+                                                           const Eigen::MatrixXd& tangents,
+                                                           const std::vector<std::uint8_t>& found,
+                                                           const Eigen::VectorXd& shares) {
+  Sites& asked = asked_.sites;
+  std::vector<Fit> fits(asked.size(), kMisfit);
+  ParallelFor(asked.size(), [&](std::size_t i) {
+    const auto c = static_cast<Eigen::Index>(i);
+    const double* const proposed = asked.points.data() + i * stride();
+    const double farthest = asked.shares[i] * (kFarthestAnswer * spacing_);
+    double* const frame = asked.frames.data() + i * stride() * K;
+    if (!found[i] || Distance(points.col(c).data(), proposed, d_) > farthest) return;
+    thread_local std::vector<double> aligned;
+    aligned.assign(frame, frame + stride() * K);
+    if (!Align<K>(tangents.col(c).data(), d_, aligned.data())) return;
+    if (predicts_) NoteChange(i, points.col(c).data(), aligned.data());
+    std::copy(aligned.begin(), aligned.end(), frame);
+    fits[i] = kFits;
+    if (shares.size() == 0) return;
+    const double expected = std::exchange(asked.shares[i], shares[c]);
+    if (!(shares[c] <= kMostOff * expected && expected <= kMostOff * shares[c]))
+      fits[i] = kUnexpected;
+  });
+  if (shares.size() == 0) return fits;
+  const auto count = [&](Fit fit) {
+    return static_cast<std::uint64_t>(std::count(fits.begin(), fits.end(), fit));
+  };
+  answered_ += count(kFits) + count(kUnexpected);
+  unexpected_ += count(kUnexpected);
+  return fits;
 }
 
 template <int K>
@@ -319,39 +380,23 @@ std::vector<Eigen::Index> Growth<K>::Join(const Eigen::MatrixXd& points,
                                           const Eigen::MatrixXd& tangents,
                                           const std::vector<std::uint8_t>& found,
                                           const Eigen::VectorXd& shares) {
-  const std::size_t count = asked_.sites.size();
-  double* const frames = asked_.sites.frames.data();
-  std::vector<std::uint8_t> fits(count);
-  ParallelFor(count, [&](std::size_t i) {
-    const auto c = static_cast<Eigen::Index>(i);
-    const double* const proposed = asked_.sites.points.data() + i * stride();
-    const double farthest = asked_.sites.shares[i] * (kFarthestAnswer * spacing_);
-    double* const frame = frames + i * stride() * K;
-    if (!found[i] || Distance(points.col(c).data(), proposed, d_) > farthest) return;
-    thread_local std::vector<double> aligned;
-    aligned.assign(frame, frame + stride() * K);
-    fits[i] = Align<K>(tangents.col(c).data(), d_, aligned.data());
-    if (!fits[i]) return;
-    if (predicts_) NoteChange(i, points.col(c).data(), aligned.data());
-    std::copy(aligned.begin(), aligned.end(), frame);
-  });
-  std::vector<std::uint32_t> columns;
-  std::vector<double> candidates, own;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    CheckInterruption(i);
-    if (!fits[i] || (shares.size() > 0 && !IsExpected(i, shares[i]))) continue;
-    columns.push_back(i);
-    own.push_back(asked_.sites.shares[i]);
-    candidates.insert(candidates.end(), points.col(i).begin(), points.col(i).end());
-  }
-  std::vector<std::uint32_t> joined = Choose(candidates, own, asked_, columns);
-  for (std::uint32_t& i : joined) i = columns[i];
-  Sites sites = SitesOf(asked_, joined);
-  for (std::size_t i = 0; i < joined.size(); ++i)
+  const std::vector<Fit> fits = FitAnswers(points, tangents, found, shares);
+  const Candidates candidates =
+      CandidatesOf(points, asked_.sites.shares,
+                   ParallelSelect(fits.size(), [&](std::size_t i) { return fits[i] == kFits; }));
+  std::vector<std::uint32_t> chosen = Choose(candidates, asked_);
+  for (std::uint32_t& i : chosen) i = candidates.columns[i];
+  Sites sites;
+  sites.Resize(chosen.size(), stride(), predicts_);
+  sites.Put(0, asked_.sites, chosen);
+  std::vector<Eigen::Index> joined(chosen.size());
+  ParallelFor(chosen.size(), [&](std::size_t i) {
+    joined[i] = chosen[i];
     std::copy_n(points.col(joined[i]).data(), d_, sites.points.data() + i * stride());
+  });
   asked_ = Proposed();
   Carry(std::move(sites));
-  return {joined.begin(), joined.end()};
+  return joined;
 }
 
 STELLATE_INSTANTIATE_CLASS(Growth)

@@ -1,11 +1,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "core/base/instantiate.h"
+#include "core/base/unset.h"
 #include "core/index/ball_tree.h"
 #include "core/index/runs.h"
 #include "core/sampling/lattice.h"
@@ -74,29 +77,43 @@ class Growth {
   static constexpr double kKeep = 0.72;
 
  private:
+  using Numbers = UnsetVector<double>;
   // Places of the lattice: points that joined, or that are proposed.
   struct Sites {
-    std::vector<double> points;  // d each
-    std::vector<double> frames;  // K rows of d each: the lattice's directions
+    Numbers points;  // d each
+    Numbers frames;  // K rows of d each: the lattice's directions
     // From where it was proposed to where it is, d, and so its frame, K rows of d; or empty.
-    std::vector<double> changes;
-    std::vector<double> shares;        // of the spacing
-    std::vector<std::uint32_t> patch;  // the seed that it came from
-    std::vector<std::uint64_t> name;   // in the lattice of its patch
+    Numbers changes;
+    Numbers shares;                    // of the spacing
+    UnsetVector<std::uint32_t> patch;  // the seed that it came from
+    UnsetVector<std::uint64_t> name;   // in the lattice of its patch
     std::size_t size() const { return patch.size(); }
-    void Append(const Sites& others);
+    // Leaves new ones unset.
+    void Resize(std::size_t count, std::size_t stride, bool predicts);
+    // Sets one to zero, to add up others.
+    void Clear(std::size_t at, std::size_t stride) {
+      std::fill_n(points.data() + at * stride, stride, 0.0);
+      std::fill_n(frames.data() + at * stride * K, stride * K, 0.0);
+      if (!changes.empty())
+        std::fill_n(changes.data() + at * stride * (K + 1), stride * (K + 1), 0.0);
+      shares[at] = 0;
+    }
+    // Writes some sites of others, `columns`, from place `at` on.
+    template <typename Column>
+    void Put(std::size_t at, const Sites& others, const std::vector<Column>& columns);
   };
   // The means of proposals for one site.
   struct Proposed {
+    // They are still to be written.
     explicit Proposed(std::size_t count = 0, std::size_t stride = 0, bool predicts = false);
     Sites sites;
-    std::vector<std::uint16_t> parents;  // how many proposed it
-    std::vector<double> clear;           // no point is nearer than this, length
+    UnsetVector<std::uint16_t> parents;  // how many proposed it
+    Numbers clear;                       // no point is nearer than this, length
   };
   // The points of some rounds; layers of about the same size are merged.
   struct Layer {
-    Layer(int d, std::vector<double> placed, std::vector<double> its_shares, double reach);
-    std::vector<double> points, shares;
+    Layer(int d, Numbers placed, Numbers its_shares, double reach);
+    Numbers points, shares;
     RunTree tree;
   };
   struct Proposal {
@@ -110,30 +127,36 @@ class Growth {
 
   std::size_t stride() const { return static_cast<std::size_t>(d_); }
   std::size_t change_stride() const { return predicts_ ? stride() * (K + 1) : 0; }
-  Runs RunsOf(const std::vector<double>& points, const std::vector<double>& shares) const;
+  Runs RunsOf(const Numbers& points, const Numbers& shares) const;
   // The points of the sample around a run.
   struct Placed {
-    std::vector<double> points, shares;  // d each; of the spacing
+    Numbers points;              // d each
+    std::vector<double> shares;  // of the spacing
   };
-  void GatherPlaced(const Runs& runs, std::size_t run, const std::vector<double>& shares,
-                    double radius, Placed* near) const;
-  std::vector<std::uint8_t> AreFarFromPlaced(const std::vector<double>& points,
-                                             const std::vector<double>& shares,
+  void GatherPlaced(const Runs& runs, std::size_t run, const Numbers& shares, double radius,
+                    Placed* near) const;
+  std::vector<std::uint8_t> AreFarFromPlaced(const Numbers& points, const Numbers& shares,
                                              double distance) const;
   void Land(const Proposal& proposal, double* point) const;
   void ProposeFrom(std::uint32_t p, const Placed& near, std::vector<Proposal>* free) const;
   std::vector<Proposal> FreePlaces() const;
   Proposed ByPlace(std::vector<Proposal> proposals) const;
   Proposed Merge(Proposed places) const;
-  std::vector<std::uint8_t> AreFree(const std::vector<double>& candidates,
-                                    const std::vector<double>& shares, const Proposed& proposed,
-                                    const std::vector<std::uint32_t>& columns) const;
-  std::vector<std::uint32_t> Choose(const std::vector<double>& candidates,
-                                    const std::vector<double>& shares, const Proposed& proposed,
-                                    const std::vector<std::uint32_t>& columns) const;
-  Sites SitesOf(const Proposed& proposed, const std::vector<std::uint32_t>& columns) const;
+  // Answers to proposals.
+  struct Candidates {
+    std::vector<std::uint32_t> columns;  // their proposals, ascending
+    Numbers points, shares;              // d each; of the spacing
+  };
+  // Those of proposals `columns`, answered by `points` where `shares` are by proposal.
+  Candidates CandidatesOf(const Eigen::MatrixXd& points, std::span<const double> shares,
+                          std::vector<std::uint32_t> columns) const;
+  std::vector<std::uint8_t> AreFree(const Candidates& candidates, const Proposed& proposed) const;
+  std::vector<std::uint32_t> Choose(const Candidates& candidates, const Proposed& proposed) const;
+  enum Fit : std::uint8_t { kMisfit, kFits, kUnexpected };
+  std::vector<Fit> FitAnswers(const Eigen::MatrixXd& points, const Eigen::MatrixXd& tangents,
+                              const std::vector<std::uint8_t>& found,
+                              const Eigen::VectorXd& shares);
   void NoteChange(std::size_t asked, const double* point, const double* frame);
-  bool IsExpected(std::size_t asked, double share);
   void Carry(Sites sites);
 
   int d_;

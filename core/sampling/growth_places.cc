@@ -7,6 +7,7 @@
 #include "core/base/dense.h"
 #include "core/base/local_maxima.h"
 #include "core/base/parallel.h"
+#include "core/base/parallel_select.h"
 #include "core/base/parallel_sort.h"
 #include "core/index/near_lists.h"
 #include "core/sampling/growth.h"
@@ -148,22 +149,25 @@ typename Growth<K>::Proposed Growth<K>::ByPlace(std::vector<Proposal> proposals)
     if (a.patch != b.patch) return a.patch < b.patch;
     return a.name != b.name ? a.name < b.name : a.parent < b.parent;
   });
-  std::vector<double> landed(proposals.size() * stride());
+  Numbers landed(proposals.size() * stride());
   ParallelFor(proposals.size(),
               [&](std::size_t i) { Land(proposals[i], landed.data() + i * stride()); });
   const auto apart = [&](std::size_t i, const double* point) {
     return Distance(landed.data() + i * stride(), point, d_);
   };
-  std::vector<std::size_t> begins;
-  for (std::size_t i = 0; i < proposals.size(); ++i) {
-    CheckInterruption(i);
-    const Proposal& own = proposals[i];
-    const Proposal& first = proposals[begins.empty() ? 0 : begins.back()];
-    if (begins.empty() || own.name != first.name || own.patch != first.patch ||
-        apart(i, landed.data() + begins.back() * stride()) >=
-            kMerged * spacing_ * std::min(own.share, first.share))
-      begins.push_back(i);
-  }
+  const auto are_namesakes = [&](std::size_t i, std::size_t j) {
+    return proposals[i].name == proposals[j].name && proposals[i].patch == proposals[j].patch;
+  };
+  std::vector<std::size_t> begins =
+      ParallelGather<std::size_t>(proposals.size(), [&](std::size_t i, auto* found) {
+        if (i > 0 && are_namesakes(i, i - 1)) return;  // found with the first of its name
+        std::size_t begin = i;
+        found->push_back(begin);
+        while (++i < proposals.size() && are_namesakes(i, begin))
+          if (apart(i, landed.data() + begin * stride()) >=
+              kMerged * spacing_ * std::min(proposals[i].share, proposals[begin].share))
+            found->push_back(begin = i);
+      });
   Proposed places(begins.size(), stride(), predicts_);
   begins.push_back(proposals.size());
   ParallelFor(places.sites.size(), [&](std::size_t place) {
@@ -171,6 +175,8 @@ typename Growth<K>::Proposed Growth<K>::ByPlace(std::vector<Proposal> proposals)
     double* const point = places.sites.points.data() + place * stride();
     double* const frame = places.sites.frames.data() + place * stride() * K;
     const double share = 1 / static_cast<double>(end - begin);
+    places.sites.Clear(place, stride());
+    places.clear[place] = 0;
     for (std::size_t i = begin; i < end; ++i) {
       const double* const other = border_.frames.data() + proposals[i].parent * stride() * K;
       for (std::size_t j = 0; j < stride(); ++j) point[j] += share * landed[i * stride() + j];
@@ -204,7 +210,7 @@ typename Growth<K>::Proposed Growth<K>::Merge(Proposed places) const {
     return SquaredDistance(sites.points.data() + i * stride(), sites.points.data() + j * stride(),
                            d_);
   };
-  std::vector<std::uint32_t> leader(sites.size());
+  UnsetVector<std::uint32_t> leader(sites.size());
   ParallelFor(sites.size(), [&](std::size_t i) {
     leader[i] = static_cast<std::uint32_t>(i);
     if (leads[i]) return;
@@ -215,11 +221,8 @@ typename Growth<K>::Proposed Growth<K>::Merge(Proposed places) const {
       leader[i] = j;
     }
   });
-  std::vector<std::uint32_t> leaders;
-  for (std::uint32_t i = 0; i < sites.size(); ++i) {
-    CheckInterruption(i);
-    if (leads[i]) leaders.push_back(i);
-  }
+  const std::vector<std::uint32_t> leaders =
+      ParallelSelect(sites.size(), [&](std::size_t i) { return leads[i] != 0; });
   if (leaders.size() == sites.size()) return places;
   Proposed merged(leaders.size(), stride(), predicts_);
   ParallelFor(leaders.size(), [&](std::size_t l) {
@@ -229,6 +232,8 @@ typename Growth<K>::Proposed Growth<K>::Merge(Proposed places) const {
     };
     double* const point = merged.sites.points.data() + l * stride();
     double* const frame = merged.sites.frames.data() + l * stride() * K;
+    merged.sites.Clear(l, stride());
+    merged.parents[l] = 0;
     double count = places.parents[lead];
     for (const std::uint32_t i : near.Of(lead)) count += is_of(i) ? places.parents[i] : 0;
     const auto add = [&](std::uint32_t i) {

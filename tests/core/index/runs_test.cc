@@ -46,6 +46,24 @@ TEST(Runs, HoldEveryPointOnceInItsBall) {
   }
 }
 
+// Long stretches are cut at once: as if one run had been cut after the other.
+TEST(Runs, DoNotDependOnHowManyAreCutAtOnce) {
+  constexpr std::size_t kCount = 30000;
+  for (const double reach : {0.02, 0.5, 1e9}) {
+    const std::vector<double> x = Walk(2, kCount);
+    const Runs runs(x, 2, reach);
+    std::size_t run = 0;
+    for (std::size_t begin = 0, end; begin < kCount; begin = end, ++run) {
+      for (end = begin + 1; end < kCount && end < begin + 32; ++end)
+        if (Distance(x.data() + 2 * begin, x.data() + 2 * end, 2) > reach) break;
+      ASSERT_LT(run, runs.count());
+      ASSERT_EQ(runs.begin(run), begin);
+      ASSERT_EQ(runs.end(run), end);
+    }
+    EXPECT_EQ(run, runs.count());
+  }
+}
+
 TEST(Runs, GoByTheShareOfTheirFirst) {
   constexpr std::size_t kCount = 300;
   std::vector<double> x(kCount), shares(kCount);
