@@ -1,11 +1,33 @@
 #include "core/run/meshing_run.h"
 
+#include <algorithm>
 #include <utility>
+#include <vector>
 
 #include "core/base/arenas.h"
 #include "core/base/message.h"
+#include "core/base/parallel.h"
 
 namespace stellate::core {
+namespace {
+
+// CheckAnswers for a whole block, in parallel.
+Status CheckInParts(const Specification& spec, const QueryBlock& block, const AnswerBlock& answer) {
+  constexpr Eigen::Index kPart = 1024;  // queries
+  if (Status s = CheckAnswerShape(spec, block, 0, answer); !s.ok()) return s;
+  const Eigen::Index count = answer.points.cols();
+  std::vector<Status> parts(static_cast<std::size_t>((count + kPart - 1) / kPart));
+  ParallelFor(parts.size(), [&](std::size_t part) {
+    const Eigen::Index first = static_cast<Eigen::Index>(part) * kPart;
+    parts[part] =
+        CheckAnswers(spec, block, first, answer.Rows(first, std::min(kPart, count - first)));
+  });
+  const auto refused =
+      std::find_if(parts.begin(), parts.end(), [](const Status& s) { return !s.ok(); });
+  return refused == parts.end() ? Status::Ok() : *refused;
+}
+
+}  // namespace
 
 template <int K>
 MeshingRun<K>::MeshingRun(Specification spec)
@@ -49,7 +71,7 @@ Status MeshingRun<K>::Check(const QueryBatch& asked, const Answers& answers) con
       return {StatusCode::kOracleShape,
               Message("block ", b, " has ", answers.blocks[b].points.cols(), " answers for ",
                       block.size(), " queries; send one for each")};
-    if (Status s = CheckAnswers(spec_, block, 0, answers.blocks[b]); !s.ok()) return s;
+    if (Status s = CheckInParts(spec_, block, answers.blocks[b]); !s.ok()) return s;
   }
   return Status::Ok();
 }
@@ -68,7 +90,9 @@ Expected<MeshDelta> MeshingRun<K>::Absorb(const Answers& answers) {
     return Refuse(StatusCode::kFailedPrecondition, "Absorb without a batch: the run is over");
   const std::shared_ptr<const QueryBatch> batch = OpenBatch();
   const QueryBatch& asked = *batch;
-  if (Status s = Check(asked, answers); !s.ok()) return tl::unexpected<Status>(s);
+  Status status = {StatusCode::kCancelled, "the computation was interrupted"};
+  WithThreads(spec_.threads, interruption_, [&] { status = Check(asked, answers); });
+  if (!status.ok()) return tl::unexpected<Status>(status);
   const bool complete = !parts_ || parts_->is_last();
   const std::optional<Answers> joined =
       complete && parts_ ? std::optional(parts_->With(answers)) : std::nullopt;

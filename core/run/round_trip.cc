@@ -5,6 +5,7 @@
 
 #include "core/base/basis_layout.h"
 #include "core/base/parallel.h"
+#include "core/base/parallel_copy.h"
 #include "core/base/vector_ops.h"
 
 namespace stellate::core {
@@ -42,8 +43,10 @@ void RoundTrip<K>::PlanPoints() {
   const int d = engine_.stars().sample().d();
   const PlannedPoints& planned = candidates_.planned;
   asked_.resize(d, candidates_.size());
-  if (candidates_.drawn() > 0) asked_.leftCols(candidates_.drawn()) = candidates_.points;
-  if (planned.size() > 0) asked_.rightCols(planned.size()) = planned.points;
+  const auto drawn = static_cast<std::size_t>(d * candidates_.drawn());
+  ParallelCopy(candidates_.points.data(), drawn, asked_.data());
+  ParallelCopy(planned.points.data(), static_cast<std::size_t>(d * planned.size()),
+               asked_.data() + drawn);
   if (oracle_.tangent_basis || !finder_.reads_normals()) return;
   const Stars<K>& stars = engine_.stars();
   const std::vector<Target<K>>& targets = candidates_.targets;
@@ -128,20 +131,35 @@ QueryBlock RoundTrip<K>::NewBlock(QueryKind kind, WallSet face) const {
 // each of their faces, if there are any.
 template <int K>
 void RoundTrip<K>::AskForAll() {
-  places_.reserve(static_cast<std::size_t>(candidates_.size()));
   if (candidates_.drawn() > 0) AskForDrawn();
   const PlannedPoints& planned = candidates_.planned;
   if (planned.size() == 0) return;
+  const auto drawn = static_cast<std::size_t>(candidates_.drawn());
+  const auto count = static_cast<std::size_t>(planned.size());
+  places_.resize(drawn + count);
+  if (planned.walls.empty()) {
+    const auto block = static_cast<int>(open_.size());
+    open_.push_back(NewBlock(QueryKind::kClosestPoint, 0));
+    open_.back().points.resize(asked_.rows(), planned.size());
+    ParallelCopy(asked_.col(candidates_.drawn()).data(),
+                 static_cast<std::size_t>(planned.points.size()), open_.back().points.data());
+    ParallelRanges(count, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i)
+        places_[drawn + i] = {block, static_cast<Eigen::Index>(i)};
+    });
+    return;
+  }
   std::vector<WallSet> faces = planned.walls;
-  faces.resize(static_cast<std::size_t>(planned.size()), 0);
+  faces.resize(count, 0);
   for (WallSet& face : faces) face = engine_.stars().sample().sectors().labels().Close(face);
   const std::map<WallSet, int> block_of = OpenBlocks(faces);
   std::vector<Eigen::Index> next(open_.size(), 0);
-  for (Eigen::Index i = 0; i < planned.size(); ++i) {
-    const int block = block_of.at(faces[static_cast<std::size_t>(i)]);
+  for (std::size_t i = 0; i < count; ++i) {
+    const int block = block_of.at(faces[i]);
     const Eigen::Index column = next[static_cast<std::size_t>(block)]++;
-    open_[static_cast<std::size_t>(block)].points.col(column) = asked_.col(candidates_.drawn() + i);
-    places_.emplace_back(block, column);
+    open_[static_cast<std::size_t>(block)].points.col(column) =
+        asked_.col(static_cast<Eigen::Index>(drawn + i));
+    places_[drawn + i] = {block, column};
   }
 }
 
@@ -188,6 +206,7 @@ void RoundTrip<K>::AskForDrawn() {
   }
   const std::map<WallSet, int> block_of = OpenBlocks(faces);
   std::vector<Eigen::Index> next(open_.size(), 0);
+  places_.reserve(static_cast<std::size_t>(candidates_.size()));
   for (std::size_t i = 0; i < targets.size(); ++i) {
     CheckInterruption(i);
     for (Eigen::Index c = candidates_.first[i]; c < candidates_.first[i + 1]; ++c) {
@@ -248,13 +267,9 @@ void RoundTrip<K>::Sort(const std::vector<AnswerBlock>& answers) {
   answers_.found.assign(static_cast<std::size_t>(count), 0);
   answers_.tangents.resize(d * K, count);
   answers_.sizes.resize(sizes_given ? count : 0);
-  for (Eigen::Index c = 0; c < count; ++c) {
+  ParallelFor(count, [&](Eigen::Index c) {
+    if (c < candidates_.drawn() && IsKnown(c)) return TakeKnown(c);
     const auto i = static_cast<std::size_t>(c);
-    CheckInterruption(i);
-    if (c < candidates_.drawn() && IsKnown(c)) {
-      TakeKnown(c);
-      continue;
-    }
     const auto [b, column] = places_[i];
     const AnswerBlock& block = answers[static_cast<std::size_t>(b)];
     answers_.found[i] =
@@ -263,7 +278,7 @@ void RoundTrip<K>::Sort(const std::vector<AnswerBlock>& answers) {
     if (sizes_given && block.sizes.size() > 0) answers_.sizes[c] = block.sizes[column];
     if (block.tangents.size() > 0)
       ToByVector(block.tangents.col(column).data(), d, K, answers_.tangents.col(c).data());
-  }
+  });
   if (policy_.TakesClearances()) SortFaces(answers);
 }
 

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "core/base/interruption.h"
 #include "core/base/message.h"
+#include "core/base/parallel.h"
 
 namespace stellate::core {
 namespace {
@@ -25,17 +25,21 @@ constexpr double kHopelessShare = 0.5;
 void BoxWatch::Look(const double* points, std::uint32_t count) {
   if (!box_) return;
   const auto d = static_cast<std::size_t>(box_->lower.size());
-  for (; looked_at_ < count; ++looked_at_) {
-    CheckInterruption(looked_at_);
-    const double* p = points + looked_at_ * d;
-    double outside2 = 0;
-    for (std::size_t i = 0; i < d; ++i) {
-      const auto axis = static_cast<Eigen::Index>(i);
-      const double beyond = std::max({box_->lower[axis] - p[i], p[i] - box_->upper[axis], 0.0});
-      outside2 += beyond * beyond;
-    }
-    outside_ += outside2 > epsilon_ * epsilon_;
-    farthest_outside_ = std::max(farthest_outside_, std::sqrt(outside2));
+  const auto outside2 =
+      ParallelGather<double>(count - looked_at_, [&](std::size_t at, auto* found) {
+        const double* const p = points + (looked_at_ + at) * d;
+        double away2 = 0;
+        for (std::size_t i = 0; i < d; ++i) {
+          const auto axis = static_cast<Eigen::Index>(i);
+          const double beyond = std::max({box_->lower[axis] - p[i], p[i] - box_->upper[axis], 0.0});
+          away2 += beyond * beyond;
+        }
+        if (away2 > 0) found->push_back(away2);
+      });
+  looked_at_ = count;
+  for (const double away2 : outside2) {
+    outside_ += away2 > epsilon_ * epsilon_;
+    farthest_outside_ = std::max(farthest_outside_, std::sqrt(away2));
   }
 }
 
