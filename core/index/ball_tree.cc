@@ -1,13 +1,16 @@
 #include "core/index/ball_tree.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <functional>
 #include <numeric>
 
 #include "core/base/capacity.h"
 #include "core/base/parallel.h"
+#include "core/base/parallel_select.h"
 #include "core/base/parallel_sort.h"
+#include "core/base/unset.h"
 
 namespace stellate::core {
 namespace {
@@ -16,6 +19,8 @@ namespace {
 constexpr std::size_t kLeastShare = 16;
 // Fewer points are not worth a second thread.
 constexpr std::size_t kBuiltAlone = 512;
+// So many are measured by all threads, and so many parted: that takes twice the work.
+constexpr std::size_t kMeasuredAlone = 2048, kPartedAlone = 16384;
 
 // The coordinate in which points extend farthest, and the middle between its ends.
 struct Extent {
@@ -23,29 +28,82 @@ struct Extent {
   double middle;
 };
 
+// Writes the box around points, d numbers each: `known`, or `any_d` if that is 0.
+template <typename Known>
+void Enclose(Known known, int any_d, const double* coordinates, const std::uint32_t* begin,
+             const std::uint32_t* end, double* low, double* high) {
+  const auto d = static_cast<std::size_t>(known() > 0 ? known() : any_d);
+  std::copy_n(coordinates + *begin * d, d, low);
+  std::copy_n(coordinates + *begin * d, d, high);
+  for (const std::uint32_t* i = begin + 1; i != end; ++i) {
+    const double* const x = coordinates + *i * d;
+    for (std::size_t j = 0; j < d; ++j) {
+      low[j] = std::min(low[j], x[j]);
+      high[j] = std::max(high[j], x[j]);
+    }
+  }
+}
+
+// The same of many, in parallel.
+template <typename Known>
+void EncloseMany(Known known, int any_d, const double* coordinates, const std::uint32_t* begin,
+                 const std::uint32_t* end, double* low, double* high) {
+  const auto d = static_cast<std::size_t>(known() > 0 ? known() : any_d);
+  const auto count = static_cast<std::size_t>(end - begin);
+  std::vector<double> boxes(ChunkCount(count) * 2 * d);
+  ParallelChunks(count, [&](std::size_t chunk, std::size_t from, std::size_t to) {
+    double* const box = boxes.data() + chunk * 2 * d;
+    Enclose(known, any_d, coordinates, begin + from, begin + to, box, box + d);
+  });
+  std::copy_n(boxes.data(), d, low);
+  std::copy_n(boxes.data() + d, d, high);
+  for (std::size_t at = 0; at < boxes.size(); at += 2 * d)
+    for (std::size_t j = 0; j < d; ++j) {
+      low[j] = std::min(low[j], boxes[at + j]);
+      high[j] = std::max(high[j], boxes[at + d + j]);
+    }
+}
+
 Extent WidestExtent(const double* coordinates, int any_d, const std::uint32_t* begin,
                     const std::uint32_t* end) {
   return WithDimension(any_d, [&](auto known) {
     const auto d = static_cast<std::size_t>(known() > 0 ? known() : any_d);
-    thread_local std::vector<double> many;
+    std::vector<double> many(known() > 0 ? 0 : 2 * d);
     double few[known() > 0 ? 2 * known() : 1];
-    if (known() == 0) many.resize(2 * d);
     double* const low = known() > 0 ? few : many.data();
     double* const high = low + d;
-    std::copy_n(coordinates + *begin * d, d, low);
-    std::copy_n(coordinates + *begin * d, d, high);
-    for (const std::uint32_t* i = begin + 1; i != end; ++i) {
-      const double* const x = coordinates + *i * d;
-      for (std::size_t j = 0; j < d; ++j) {
-        low[j] = std::min(low[j], x[j]);
-        high[j] = std::max(high[j], x[j]);
-      }
-    }
+    if (static_cast<std::size_t>(end - begin) < kMeasuredAlone)
+      Enclose(known, any_d, coordinates, begin, end, low, high);
+    else
+      EncloseMany(known, any_d, coordinates, begin, end, low, high);
     std::size_t widest = 0;
     for (std::size_t j = 1; j < d; ++j)
       if (high[j] - low[j] > high[widest] - low[widest]) widest = j;
     return Extent{widest, low[widest] + (high[widest] - low[widest]) / 2};
   });
+}
+
+// As std::partition, in the same order, in parallel if they are many: of those on the wrong side
+// the first from either end change places, and so on.
+template <typename Below>
+std::uint32_t* PartPoints(std::uint32_t* begin, std::uint32_t* end, const Below& is_below) {
+  const auto count = static_cast<std::size_t>(end - begin);
+  if (count < kPartedAlone) return std::partition(begin, end, is_below);
+  const auto below = ParallelSelect(count, [&](std::size_t i) { return is_below(begin[i]); });
+  const std::size_t middle = below.size();
+  const auto above = ParallelSelect(middle, [&](std::size_t i) { return !is_below(begin[i]); });
+  ParallelFor(above.size(),
+              [&](std::size_t i) { std::swap(begin[above[i]], begin[below[middle - 1 - i]]); });
+  return begin + middle;
+}
+
+// Makes `most` at least `value`, for all threads at once.
+void RaiseTo(double value, double* most) {
+  const std::atomic_ref<double> shared(*most);
+  double before = shared.load(std::memory_order_relaxed);
+  while (before < value &&
+         !shared.compare_exchange_weak(before, value, std::memory_order_relaxed)) {
+  }
 }
 
 }  // namespace
@@ -76,17 +134,31 @@ void BallTree::Mean(const std::uint32_t* begin, const std::uint32_t* end, double
 void BallTree::Measure(std::uint32_t node, const std::uint32_t* begin, const std::uint32_t* end) {
   double* c = Centre(node);
   Mean(begin, end, c);
-  double radius = 0, outreach = 0;
-  WithDimension(d_, [&](auto known) {
-    const int d = known() > 0 ? known() : d_;
-    for (const std::uint32_t* i = begin; i != end; ++i) {
-      const double distance = Distance(c, Point(*i), d);
-      radius = std::max(radius, distance);
-      outreach = std::max(outreach, distance + influence_[*i]);
-    }
-  });
-  nodes_[node].radius = radius;
-  nodes_[node].outreach = outreach;
+  const auto measure = [&](std::size_t from, std::size_t to) {
+    std::pair<double, double> most;  // radius and outreach
+    WithDimension(d_, [&](auto known) {
+      const int d = known() > 0 ? known() : d_;
+      for (const std::uint32_t* i = begin + from; i != begin + to; ++i) {
+        const double distance = Distance(c, Point(*i), d);
+        most.first = std::max(most.first, distance);
+        most.second = std::max(most.second, distance + influence_[*i]);
+      }
+    });
+    return most;
+  };
+  const auto count = static_cast<std::size_t>(end - begin);
+  std::pair<double, double> most;
+  if (count < kMeasuredAlone) {
+    most = measure(0, count);
+  } else {
+    ParallelChunks(count, [&](std::size_t, std::size_t from, std::size_t to) {
+      const auto some = measure(from, to);
+      RaiseTo(some.first, &most.first);
+      RaiseTo(some.second, &most.second);
+    });
+  }
+  nodes_[node].radius = most.first;
+  nodes_[node].outreach = most.second;
 }
 
 void BallTree::MakeLeaf(std::uint32_t node, std::uint32_t first_slot, const std::uint32_t* begin,
@@ -107,8 +179,8 @@ std::uint32_t* BallTree::Middle(std::uint32_t* begin, std::uint32_t* end, Halvin
     const Extent widest = WidestExtent(coordinates_->data(), d_, begin, end);
     const double* const along = coordinates_->data() + widest.coordinate;
     const auto stride = static_cast<std::size_t>(d_);
-    std::uint32_t* const middle = std::partition(
-        begin, end, [&](std::uint32_t i) { return along[i * stride] < widest.middle; });
+    std::uint32_t* const middle =
+        PartPoints(begin, end, [&](std::uint32_t i) { return along[i * stride] < widest.middle; });
     const auto below = static_cast<std::size_t>(middle - begin);
     if (kLeastShare * std::min(below, count - below) >= count) return middle;
   }
@@ -194,8 +266,10 @@ void BallTree::Build(std::uint32_t node, Place place, std::uint32_t* begin, std:
 void BallTree::Rebuild(Halving halving) {
   built_ = influence_.size();
   stale_.clear();
-  std::vector<std::uint32_t> ids(built_);
-  std::iota(ids.begin(), ids.end(), 0u);
+  UnsetVector<std::uint32_t> ids(built_);
+  ParallelRanges(built_, [&](std::size_t begin, std::size_t end) {
+    std::iota(ids.data() + begin, ids.data() + end, static_cast<std::uint32_t>(begin));
+  });
   const std::unique_ptr<Halves> halves = Halve(ids.data(), ids.data() + ids.size(), halving);
   nodes_.assign(2 * std::size_t{halves->leaves} - 1, {});
   centres_.assign(nodes_.size() * static_cast<std::size_t>(d_), 0.0);
