@@ -16,9 +16,6 @@ namespace {
 // should not lie next to a ball.
 constexpr double kNeedsBall = 0.64278760968653933;       // cosine of 50 degrees
 constexpr double kProtectedBelow = 0.34202014332566873;  // of 70
-// As a share of the size bound. A simplex at a point with a protecting ball is measured beyond that
-// ball.
-constexpr double kLargest = 0.6;
 constexpr double kOtherEdge = 1.0 / 3;
 constexpr double kOtherPoint = 0.9;  // of the distance to points inside of faces
 // The sum of the radii at the ends of an edge at a corner, as a share of its length: there the
@@ -67,7 +64,7 @@ std::vector<HalfEdge<K>> EdgesAt(const Stars<K>& stars, std::uint32_t p) {
 // edge.
 template <int K>
 double ClearanceAt(const Stars<K>& stars, std::uint32_t p, double bound) {
-  double clearance = kLargest * bound;
+  double clearance = kLargestBall * bound;
   stars.sample().ForEachWithin(
       stars.sample().Point(p), clearance / kOtherEdge, [&](std::uint32_t q) {
         if (q == p) return;

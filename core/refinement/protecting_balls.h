@@ -7,6 +7,10 @@
 
 namespace stellate::core {
 
+// The largest radius of a protecting ball, as a share of the size bound. A simplex at a point with
+// a ball is measured beyond that ball.
+inline constexpr double kLargestBall = 0.6;
+
 // Protecting balls of sharp edges, k = 3 (Cheng, Dey and Ramos). If two walls meet at less than
 // about 50 degrees, refining one encroaches on the other and back, without end. Therefore each
 // vertex of such an edge, and each corner at its ends, gets a ball in which no point is inserted.

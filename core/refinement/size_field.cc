@@ -10,6 +10,7 @@
 #include "core/base/vector_ops.h"
 #include "core/boundary/boundary_mesh.h"
 #include "core/geometry/reach_bound.h"
+#include "core/refinement/protecting_balls.h"
 
 namespace stellate::core {
 namespace {
@@ -153,7 +154,10 @@ double SizeField<K>::BoundFor(double size) const {
 template <int K>
 double SizeField<K>::BoundAt(const Stars<K>& stars, std::uint32_t p) const {
   if (!is_graded_) return epsilon_;
-  return BoundFor(is_given_ ? given_[p] : Estimate(stars, p));
+  if (is_given_) return BoundFor(given_[p]);
+  // The bound that a ball was made by stays, whatever is estimated later.
+  return std::max(BoundFor(Estimate(stars, p)),
+                  std::sqrt(stars.sample().ProtectingRadius2(p)) / kLargestBall);
 }
 
 template <int K>

@@ -39,7 +39,8 @@ class SizeField {
   // nothing else to do, if it has changed at all.
   bool NeedsSpreading(const Stars<K>& stars, bool nothing_else_to_do) const;
 
-  // The largest circumradius that R1 allows at a star.
+  // The largest circumradius that R1 allows at a star. Estimates ask for no point in a protecting
+  // ball, into which none is inserted.
   double BoundAt(const Stars<K>& stars, std::uint32_t star) const;
   // The same where the local size is `size`.
   double BoundFor(double size) const;

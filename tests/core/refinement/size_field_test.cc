@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "core/refinement/protecting_balls.h"
 #include "tests/core/support/samples.h"
 
 namespace stellate::core {
@@ -81,6 +82,22 @@ TEST(SizeField, SeesTheRadiusOfASphere) {
     most = std::max(most, std::sqrt(stars.cell(p).max_norm2()));
   }
   EXPECT_NEAR(sizes.MaxRadiusOverSize(stars), most, 1e-6 * most);
+}
+
+// No point is inserted into a protecting ball: a finer bound at its centre could never hold.
+TEST(SizeField, AsksForNoPointInAProtectingBall) {
+  Specification spec = Spec(0.6);
+  spec.criteria.size_rate = 0.1;
+  SizeField<2> sizes(Resolve(spec));
+  Stars<2> stars = ComplexOn("sphere", 200);
+  std::vector<double> radii2(stars.size(), 0.0);
+  radii2[3] = 0.09 * 0.09;
+  radii2[5] = 0.01 * 0.01;
+  stars.SetProtectingBalls(radii2);
+  sizes.Look(stars, All(stars));
+  EXPECT_DOUBLE_EQ(sizes.BoundAt(stars, 3), 0.09 / kLargestBall);
+  EXPECT_NEAR(sizes.BoundAt(stars, 5), 0.1, 1e-6) << "a small ball leaves the bound as it is";
+  EXPECT_NEAR(sizes.BoundAt(stars, 7), 0.1, 1e-6);
 }
 
 TEST(SizeField, IsLipschitzOnceSpread) {
