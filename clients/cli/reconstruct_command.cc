@@ -37,7 +37,7 @@ ReconstructCommand::ReconstructCommand(CLI::App& parent)
   command_->add_option("--drop", options_.drop, "share of the points that may be left out")
       ->capture_default_str();
   command_->add_flag("--open", open_, "the manifold may have a boundary");
-  const std::map<std::string, Weighting> weightings = {{"auto", Weighting::kAuto},
+  const std::map<std::string, Weighting> weightings = {{"auto", Weighting::kAsNeeded},
                                                        {"only", Weighting::kOnly}};
   command_
       ->add_option("--weights", options_.weights,

@@ -14,8 +14,8 @@ namespace stellate {
 
 // How stars of points that disagree are made to agree.
 enum class Weighting {
-  kAuto,  // by tilings, and by weights of points where these do not do
-  kOnly,  // by weights of points alone: the mesh is the weighted tangential Delaunay complex
+  kAsNeeded,  // by tilings, and by weights of points where these do not do
+  kOnly,      // by weights of points alone: the mesh is the weighted tangential Delaunay complex
 };
 
 // What points are, and how they are to become a mesh.
@@ -29,7 +29,7 @@ struct ReconstructOptions {
   std::optional<double> reach;
   double drop = 0.001;  // the share of the points that may be left out
   bool closed = true;   // false: it may have a boundary, and the mesh ends where the points end
-  Weighting weights = Weighting::kAuto;
+  Weighting weights = Weighting::kAsNeeded;
   // Whether vertices may be added, after the points, where stars disagree and nothing else helps:
   // at most one for each hundred points, or 16.
   bool steiner = false;
