@@ -59,6 +59,19 @@ func TestReconstructedSphere(t *testing.T) {
 	}
 }
 
+func TestReconstructedByWeightsOnly(t *testing.T) {
+	mesh := reconstructed(t, spherePoints(600, -1), &stellate.ReconstructOptions{Connection: server(t),
+		Noise: exact, RequireCertified: true, WeightsOnly: true, Steiner: true,
+		Spec: func(spec *pb.Reconstruction) {
+			if spec.GetWeights() != pb.Weighting_WEIGHTING_ONLY || !spec.GetSteiner() {
+				t.Error(spec)
+			}
+		}})
+	if mesh.SimplexCount() != 2*600-4 {
+		t.Error(counts(mesh))
+	}
+}
+
 func TestReconstructedWithTangentsIsProved(t *testing.T) {
 	cloud := spherePoints(2500, -1)
 	for i := 0; i < len(cloud.Points); i += 3 {

@@ -16,7 +16,12 @@ type ReconstructOptions struct {
 	Reach float64  // a promise: the manifold's reach is at least this. Exact points may then be proved
 	Drop  *float64 // the share of the points that may be left out, 0 to 0.5; nil: one in a thousand
 	Open  bool     // the manifold may have a boundary, and the mesh ends where the points do
-	Label string
+	// WeightsOnly asks for the weighted tangential Delaunay complex: stars are made to agree by weights of
+	// points alone, or the mesh is refused.
+	WeightsOnly bool
+	// Steiner lets points be added where nothing else makes stars agree: vertices after the points.
+	Steiner bool
+	Label   string
 	// Spec, if there is one, changes the rest of the specification before it is sent.
 	Spec func(*pb.Reconstruction)
 
@@ -29,6 +34,10 @@ func (o *ReconstructOptions) spec(cloud *PointCloud) *pb.Reconstruction {
 		Dimension: uint32(cloud.Dimension), AmbientDimension: uint32(cloud.AmbientDimension),
 		Points: uint64(cloud.count()), Tangents: cloud.Tangents != nil, Noise: o.Noise,
 		DeclaredReach: positive(o.Reach), Drop: o.Drop, Open: o.Open, Label: o.Label,
+		Steiner: o.Steiner,
+	}
+	if o.WeightsOnly {
+		spec.Weights = pb.Weighting_WEIGHTING_ONLY
 	}
 	if o.Spec != nil {
 		o.Spec(spec)

@@ -23,6 +23,13 @@ export interface PointOptions {
   drop?: number;
   /** False: the manifold may have a boundary, and the mesh ends where the points do. */
   closed?: boolean;
+  /**
+   * "only": the weighted tangential Delaunay complex. Stars are made to agree by weights of points alone, or
+   * the mesh is refused. Default: "auto", tilings first.
+   */
+  weights?: "auto" | "only";
+  /** True: points may be added where nothing else makes stars agree. They are vertices after the points. */
+  steiner?: boolean;
   label?: string;
   workerWaitSeconds?: number;
   answerSeconds?: number;
@@ -36,10 +43,14 @@ const KNOWN: ReadonlySet<string> = new Set([
   "reach",
   "drop",
   "closed",
+  "weights",
+  "steiner",
   "label",
   "workerWaitSeconds",
   "answerSeconds",
 ]);
+
+const WEIGHTINGS = { auto: "WEIGHTING_AUTO", only: "WEIGHTING_ONLY" } as const;
 
 /** Points, and what is asked of their mesh: checked, as the protocol has it. */
 export class CheckedPoints {
@@ -69,7 +80,10 @@ export class CheckedPoints {
         `tangents have ${tangents.length} numbers, and need ${k * points.length}: [n, d, k]`,
       );
     }
-    const { workerWaitSeconds, answerSeconds } = options;
+    const { weights = "auto", workerWaitSeconds, answerSeconds } = options;
+    if (!Object.hasOwn(WEIGHTINGS, weights)) {
+      throw new InvalidArgument(`weights has to be "auto" or "only", and is ${String(weights)}`);
+    }
     this.spec = {
       dimension: k,
       ambientDimension: d,
@@ -81,6 +95,8 @@ export class CheckedPoints {
       noise: options.noise,
       declaredReach: options.reach,
       drop: options.drop,
+      weights: WEIGHTINGS[weights],
+      steiner: options.steiner === true,
     };
   }
 

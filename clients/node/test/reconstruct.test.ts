@@ -48,6 +48,24 @@ test("a sphere is certified, its vertices the points, through one server or its 
   client.close();
 });
 
+test("weights alone make a mesh, and other words for them are refused", async () => {
+  const options = { ...asked, noise: 0, steiner: true, weights: "only" } as const;
+  const mesh = await stellate.reconstruct(sphere(600), {
+    ...options,
+    server,
+    requireCertified: true,
+  });
+  assert.equal(mesh.simplexCount, 2 * 600 - 4);
+  const { spec } = new CheckedPoints(sphere(600), options);
+  assert.equal(spec.weights, "WEIGHTING_ONLY");
+  assert.equal(spec.steiner, true);
+  const other = "toString" as "only";
+  await assert.rejects(
+    () => stellate.reconstruct(sphere(600), { ...asked, weights: other }),
+    /weights has to be "auto" or "only"/,
+  );
+});
+
 test("tangent spaces go with the points, and proofs follow from a reach", async () => {
   const points = sphere(2500);
   const tangents = new Float64Array(2 * points.length);

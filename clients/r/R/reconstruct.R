@@ -11,7 +11,8 @@
 #' @param drop the share of the points that may be left out, 0 to 0.5.
 #' @param closed FALSE: the manifold may have a boundary, and the mesh ends where the points do.
 #' @param server,on_progress as for `mesh`.
-#' @param ... more keywords of Python's `stellate.reconstruct`: credentials, label...
+#' @param ... more keywords of Python's `stellate.reconstruct`: credentials, label, weights
+#'   ("only": the weighted tangential Delaunay complex), steiner (TRUE: points may be added)...
 #' @return list of class "stellate_mesh", as of `mesh`, and in it besides `places`, what became of
 #'   each point: "OK", "TILED", ... or why it is not resolved; and `smoothed`, the positions that
 #'   the complex was built on where the points are noisy, n x d, else NULL.

@@ -39,6 +39,14 @@ class PointsTest < Minitest::Test
     assert_empty Stellate::Client.new(@server).list.to_a
   end
 
+  def test_weights_alone
+    mesh = reconstructed(sphere(600), noise: 0, weights: 'only', steiner: true, require_certified: true)
+    assert_equal (2 * 600) - 4, mesh.simplices.size
+    error = assert_raises(Stellate::InvalidArgument) { reconstructed(sphere(600), weights: 'heavy') }
+    assert_includes error.message, "weights has to be 'auto' or 'only'"
+    assert_raises(Stellate::InvalidArgument) { reconstructed(sphere(600), steiner: 'often') }
+  end
+
   def test_tangent_spaces_and_a_reach_are_a_proof
     points = sphere(2500)
     tangents = points.map do |x, y, z|

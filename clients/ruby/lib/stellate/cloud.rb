@@ -6,9 +6,10 @@ module Stellate
   # Points on a manifold or near it, and what is asked of their mesh: checked, and as they travel.
   class Cloud
     CHUNK_BYTES = 1 << 20 # of the points in a message, where the server takes as much
-    OPTIONS = { noise: :noise, reach: :declared_reach, drop: :drop, label: :label }.freeze
+    OPTIONS = { noise: :noise, reach: :declared_reach, drop: :drop, steiner: :steiner, label: :label }.freeze
+    WEIGHTINGS = { 'auto' => :WEIGHTING_AUTO, 'only' => :WEIGHTING_ONLY }.freeze
     LIMITS = %i[worker_wait_seconds answer_seconds].freeze
-    private_constant :CHUNK_BYTES, :OPTIONS, :LIMITS
+    private_constant :CHUNK_BYTES, :OPTIONS, :WEIGHTINGS, :LIMITS
 
     # A V1::Reconstruction. Its ranges are the server's to check.
     attr_reader :spec
@@ -64,12 +65,19 @@ module Stellate
       if OPTIONS.key?(name) then @spec[OPTIONS[name].to_s] = value
       elsif LIMITS.include?(name) then @spec.limits[name.to_s] = value
       elsif name == :closed then @spec.open = !value
+      elsif name == :weights then @spec.weights = weighting(value)
       else
-        known = (OPTIONS.keys + LIMITS + %i[closed]).sort
+        known = (OPTIONS.keys + LIMITS + %i[closed weights]).sort
         raise Stellate.invalid("no option #{name}; known: #{known.join(', ')}")
       end
     rescue TypeError, RangeError => e
       raise Stellate.invalid("#{name} cannot be #{value.inspect}: #{e.message}")
+    end
+
+    def weighting(value)
+      WEIGHTINGS.fetch(value.to_s) do
+        raise Stellate.invalid("weights has to be 'auto' or 'only', and is #{value.inspect}")
+      end
     end
 
     def block(row, count)

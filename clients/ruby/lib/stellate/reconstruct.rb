@@ -10,6 +10,9 @@ module Stellate
     #   reach: a promise: the manifold's reach is at least this length. Exact points may then be proved
     #   drop: the share of the points that may be left out, 0 to 0.5; closed: false for a manifold that may
     #     have a boundary: the mesh ends where the points do
+    #   weights: 'only' for the weighted tangential Delaunay complex: stars are made to agree by weights of points
+    #     alone, or the mesh is refused; else 'auto'
+    #   steiner: true: points may be added where nothing else makes stars agree, vertices after the points
     #   server, credentials, on_progress, require_certified, save: as for `mesh`; label, worker_wait_seconds,
     #     answer_seconds: see mesh.proto
     # Ctrl-C cancels the mesh, and is Cancelled.
