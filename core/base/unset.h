@@ -11,10 +11,6 @@ namespace stellate::core {
 template <typename Item>
 struct UnsetAllocator : std::allocator<Item> {
   template <typename Other>
-  struct rebind {
-    using other = UnsetAllocator<Other>;
-  };
-  template <typename Other>
   void construct(Other* at) noexcept {
     ::new (static_cast<void*>(at)) Other;
   }

@@ -66,8 +66,8 @@ class Assembler {
   }
 
  private:
-  TiledStars BuildAll(std::vector<std::uint32_t> ids, CentreRule rule) {
-    return BuildTiledStars<K>(cloud_, {.ids = std::move(ids), .rule = rule, .spacing = spacing_});
+  TiledStars BuildAll(const std::vector<std::uint32_t>& ids, CentreRule rule) {
+    return BuildTiledStars<K>(cloud_, {.ids = ids, .rule = rule, .spacing = spacing_});
   }
 
   // Takes the stars of weighted points if all agree, or if there is to be nothing else. Returns

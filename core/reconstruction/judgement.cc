@@ -168,7 +168,7 @@ class Judge {
   }
 
   std::string Causes() const {
-    const std::string causes = DescribeCauses(mesh_, known_);
+    std::string causes = DescribeCauses(mesh_, known_);
     if (spec_.weights != Weighting::kOnly || counts_.unfilled_vertices == 0) return causes;
     return Message(causes, ". No weights were found by which all stars agree, and at ",
                    counts_.unfilled_vertices,
