@@ -336,7 +336,7 @@ bool PostgresRecords::Run(const char* sql, const Parameters& parameters, Rows* r
 }
 
 // Of one mesh.
-bool PostgresRecords::Write(const char* sql, std::int64_t mesh, Parameters parameters) {
+bool PostgresRecords::Write(const char* sql, std::int64_t mesh, const Parameters& parameters) {
   Rows rows;
   if (!Run(sql, parameters, &rows)) return false;
   if (rows.count() == 1) return true;

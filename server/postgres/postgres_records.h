@@ -67,7 +67,7 @@ class PostgresRecords final : public Records, public Sharing {
       : url_(std::move(url)), options_(options), lease_(std::move(lease)) {}
   bool Run(const char* sql, const Parameters& parameters, Rows* rows);
   Connection::Outcome TryRun(const char* sql, const Parameters& parameters, Rows* rows);
-  bool Write(const char* sql, std::int64_t mesh, Parameters parameters);
+  bool Write(const char* sql, std::int64_t mesh, const Parameters& parameters);
   bool Begin();
   bool SendPut();
   bool Measure(std::int64_t mesh, KindRange kinds, std::int64_t* records);

@@ -137,7 +137,7 @@ void Router::Tend(const std::string& mesh) {
 
 Route Router::Resolve(const std::string& mesh, bool is_passed_on) {
   if (IsHere(mesh)) return {};
-  const Route not_now{Route::Kind::kNotNow, 0, nullptr};
+  Route not_now{Route::Kind::kNotNow, 0, nullptr};
   const auto found = state_.journal->Locate(mesh);
   if (!found) return not_now;
   if (found->exists && found->is_gone) {
