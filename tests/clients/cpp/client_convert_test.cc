@@ -49,8 +49,10 @@ void FillWithNumbers(google::protobuf::Message* message) {
   const auto* reflection = message->GetReflection();
   for (int i = 0; i < message->GetDescriptor()->field_count(); ++i) {
     const Field* field = message->GetDescriptor()->field(i);
-    if (field->is_repeated()) continue;
-    if (field->cpp_type() == Field::CPPTYPE_UINT32) {
+    if (field->is_repeated()) {
+      if (field->cpp_type() == Field::CPPTYPE_INT64)
+        reflection->AddInt64(message, field, 100 + field->number());
+    } else if (field->cpp_type() == Field::CPPTYPE_UINT32) {
       reflection->SetUInt32(message, field, static_cast<std::uint32_t>(100 + field->number()));
     } else if (field->cpp_type() == Field::CPPTYPE_UINT64) {
       reflection->SetUInt64(message, field, static_cast<std::uint64_t>(100 + field->number()));
@@ -70,7 +72,10 @@ void ExpectInJson(const google::protobuf::Message& message, const std::string& j
     using Field = google::protobuf::FieldDescriptor;
     const bool number = type == Field::CPPTYPE_UINT64 || type == Field::CPPTYPE_INT64 ||
                         type == Field::CPPTYPE_DOUBLE;
-    if (number) wanted += std::to_string(100 + field->number());
+    if (number) {
+      const std::string value = std::to_string(100 + field->number());
+      wanted += field->is_repeated() ? '[' + value + ']' : value;
+    }
     EXPECT_NE(json.find(wanted), std::string::npos) << wanted << " in\n" << json;
   }
 }
