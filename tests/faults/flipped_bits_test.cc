@@ -44,14 +44,14 @@ class FlippedBits : public testing::JournalTest {
     const auto journal = Open();
     RunMesh(Named(journal.get(), 3));
     const auto under_way = WriteRounds(journal.get(), 3, 50);
-    // Until the threads of the journal have nothing more to do: the mark comes last.
+    // Until the threads of the journal have nothing more to do: the mark comes last. The WAL is empty
+    // where they have carried all of it into the database by then.
     std::map<std::string, std::string> before;
-    const auto is_empty = [](const auto& file) { return file.second.empty(); };
     do {
       before = files_;
       std::this_thread::sleep_for(std::chrono::milliseconds(100));
       for (const char* name : kFiles) files_[name] = ContentOf(directory_ + name);
-    } while (files_ != before || std::any_of(files_.begin(), files_.end(), is_empty));
+    } while (files_ != before || files_.at(kFiles[2]).empty());
     work_ = directory_ + "-flipped";
     Restore();
     EXPECT_TRUE(Compare()) << "not even without a flip";
@@ -144,7 +144,8 @@ TEST_F(FlippedBits, NoneIsSilentlyALoss) {
   std::mt19937_64 random(static_cast<unsigned>(FromEnvironment("STELLATE_FAULT_SEED", 1)));
   std::map<std::string, int> refused, harmless;
   for (int flip = 0; flip < flips && !HasFailure(); ++flip) {
-    const char* const name = kFiles[random() % 10 == 0 ? 2 : random() % 2];
+    const char* name = kFiles[random() % 10 == 0 ? 2 : random() % 2];
+    if (files_.at(name).empty()) name = kFiles[0];
     std::string content = files_.at(name);
     const std::uint64_t bit = random() % (8 * content.size());
     content[bit / 8] = static_cast<char>(content[bit / 8] ^ (1 << bit % 8));
