@@ -135,7 +135,13 @@ core::Expected<std::unique_ptr<ServerLease>> ServerLease::Take(
   std::unique_ptr<ServerLease> lease(
       new ServerLease(url, std::move(*opened), std::move(*secret), entered.Number(0, 0)));
   if (options.alone) lease->Announce(kUnlisted);
-  while (lease->Peers().empty() || (options.alone && lease->Peers().size() > 1)) {
+  // The others have looked by then, and miss none of this server's meshes in their lists.
+  const TimePoint seen = Clock::now() + 2 * kBetween;
+  const auto must_wait = [&] {
+    const std::size_t known = lease->Peers().size();  // this one among them
+    return known == 0 || (known > 1 && (options.alone || Clock::now() < seen));
+  };
+  while (must_wait()) {
     std::this_thread::sleep_for(kBetween / 10);
     if (give_up()) return core::Refuse(StatusCode::kCancelled, "stopped while others were there");
   }

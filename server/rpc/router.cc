@@ -20,6 +20,9 @@ using core::Message;
 
 constexpr auto kLook = std::chrono::milliseconds(250);
 constexpr auto kTend = std::chrono::seconds(1);
+// For which a call is kept while its mesh goes from one server to another: a server that died is
+// missed for five seconds before another takes its meshes up.
+constexpr auto kMoving = std::chrono::seconds(8);
 constexpr std::size_t kPrefix = std::string_view("meshes/").size();
 constexpr std::size_t kNumberDigits = 8;  // of a server's number in a name
 constexpr std::uint64_t kNumbers = std::uint64_t{1} << (4 * kNumberDigits);
@@ -84,26 +87,41 @@ bool Router::IsHere(const std::string& mesh) const {
 }
 
 void Router::Find(const std::string& mesh, bool is_passed_on, Then then) {
-  Route route;
-  if (sharing_ != nullptr && IsMeshName(mesh) && !IsHere(mesh)) {
+  if (sharing_ == nullptr || !IsMeshName(mesh) || IsHere(mesh)) return then({});
+  Ask([this, mesh, is_passed_on] { return Resolve(mesh, is_passed_on); }, std::move(then));
+}
+
+void Router::FindPage(const std::string& token, bool is_passed_on, Then then) {
+  Route route = ResolvePage(token, is_passed_on);
+  if (route.kind != Route::Kind::kNotNow) return then(std::move(route));
+  Ask([this, token, is_passed_on] { return ResolvePage(token, is_passed_on); }, std::move(then));
+}
+
+void Router::Ask(std::function<Route()> resolve, Then then) {
+  {
     const std::lock_guard lock(mutex_);
     if (!refuses_) {
-      asked_.push_back(std::make_shared<Asked>(Asked{mesh, is_passed_on, std::move(then)}));
+      asked_.push_back(std::make_shared<Asked>(Asked{std::move(resolve), std::move(then)}));
       wake_.notify_one();
       return;
     }
-    route.kind = Route::Kind::kNotNow;
   }
-  then(std::move(route));
+  then({Route::Kind::kNotNow, 0, nullptr});
+}
+
+std::shared_ptr<Router::Asked> Router::FirstDue() const {
+  const auto due = [now = Clock::now()](const auto& asked) { return asked->next <= now; };
+  const auto first = std::find_if(asked_.begin(), asked_.end(), due);
+  return first == asked_.end() ? nullptr : *first;
 }
 
 void Router::Run(const std::stop_token& stop) {
   TimePoint tended;
   std::unique_lock lock(mutex_);
   while (!stop.stop_requested()) {
-    wake_.wait_for(lock, stop, kLook, [this] { return !asked_.empty(); });
+    wake_.wait_for(lock, stop, kLook, [this] { return FirstDue() != nullptr; });
     if (refuses_) continue;
-    const auto asked = asked_.empty() ? nullptr : asked_.front();
+    const auto asked = FirstDue();
     lock.unlock();
     state_.store.YieldElsewhere();
     if (sharing_->IsTendingDue() || Clock::now() - tended > kTend) {
@@ -111,10 +129,16 @@ void Router::Run(const std::stop_token& stop) {
       tended = Clock::now();
     }
     Route route;
-    if (asked != nullptr) route = Resolve(asked->mesh, asked->is_passed_on);
+    if (asked != nullptr) route = asked->resolve();
     lock.lock();
     const auto at = std::find(asked_.begin(), asked_.end(), asked);
     if (at == asked_.end()) continue;  // there was none, or Refuse has told it
+    if (const TimePoint now = Clock::now();
+        route.kind == Route::Kind::kNotNow && now - asked->since < kMoving) {
+      asked->next = now + kLook;
+      asked_.splice(asked_.end(), asked_, at);  // others first
+      continue;
+    }
     asked_.erase(at);
     lock.unlock();
     asked->then(std::move(route));
@@ -219,7 +243,7 @@ std::int64_t Router::NumberAfter(std::int64_t number) const {
   return 0;
 }
 
-Route Router::FindPage(const std::string& token, bool is_passed_on) const {
+Route Router::ResolvePage(const std::string& token, bool is_passed_on) const {
   if (sharing_ == nullptr || is_passed_on) return {};
   const std::int64_t turn = NumberAfter(ReadPageToken(token).server - 1);
   if (turn == 0 || turn == sharing_->number()) return {};

@@ -52,11 +52,12 @@ class Router {
   void Join();
 
   // Calls `then` with the route to a mesh: immediately where this server has it, or else on the
-  // thread. `is_passed_on`: by another server, so that it must not be once more.
+  // thread. A call for a mesh that goes from one server to another is kept until it is there, some
+  // seconds at most. `is_passed_on`: by another server, so that it must not be once more.
   using Then = std::function<void(Route)>;
   void Find(const std::string& mesh, bool is_passed_on, Then then);
-  // The same for a page of ListMeshes: pages go from server to server. Does not wait.
-  Route FindPage(const std::string& token, bool is_passed_on) const;
+  // The same for a page of ListMeshes: pages go from server to server.
+  void FindPage(const std::string& token, bool is_passed_on, Then then);
 
   // Tells who the caller is to the server at the route's end, and takes over the call's deadline.
   void Introduce(const Route& route, const Identity& caller, const std::string& address,
@@ -76,9 +77,9 @@ class Router {
 
  private:
   struct Asked {
-    std::string mesh;
-    bool is_passed_on = false;
+    std::function<Route()> resolve;
     Then then;
+    TimePoint since = Clock::now(), next = since;  // not before
   };
   // Connections to a server. One carries so many calls; more would wait in it, unseen.
   struct Line {
@@ -88,8 +89,12 @@ class Router {
   };
 
   void Run(const std::stop_token& stop);
+  // Resolves on the thread, or not at all if no more may be asked.
+  void Ask(std::function<Route()> resolve, Then then);
+  std::shared_ptr<Asked> FirstDue() const;  // (locked)
   void Tend(const std::string& mesh);
   Route Resolve(const std::string& mesh, bool is_passed_on);
+  Route ResolvePage(const std::string& token, bool is_passed_on) const;
   Route To(const Peer& peer) const;
   bool IsHere(const std::string& mesh) const;
 

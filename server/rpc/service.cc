@@ -21,8 +21,8 @@ void FindRoute(Router& router, const Request& request, bool is_passed_on, Router
   router.Find(mesh, is_passed_on, std::move(then));
 }
 void FindRoute(Router& router, const v1::ListMeshesRequest& request, bool is_passed_on,
-               const Router::Then& then) {
-  then(router.FindPage(request.page_token(), is_passed_on));
+               Router::Then then) {
+  router.FindPage(request.page_token(), is_passed_on, std::move(then));
 }
 
 // One request, one response.
