@@ -3,7 +3,6 @@
 #include <CLI/CLI.hpp>
 #include <exception>
 #include <iostream>
-#include <map>
 #include <utility>
 
 #include "progress_bar.h"
@@ -37,13 +36,17 @@ ReconstructCommand::ReconstructCommand(CLI::App& parent)
   command_->add_option("--drop", options_.drop, "share of the points that may be left out")
       ->capture_default_str();
   command_->add_flag("--open", open_, "the manifold may have a boundary");
-  const std::map<std::string, Weighting> weightings = {{"auto", Weighting::kAsNeeded},
-                                                       {"only", Weighting::kOnly}};
   command_
-      ->add_option("--weights", options_.weights,
-                   "auto: of points where tilings do not make stars agree; only: no tilings, the "
-                   "weighted tangential Delaunay complex")
-      ->transform(CLI::CheckedTransformer(weightings).description(""))
+      ->add_option(
+          "--weights",
+          [this](const CLI::results_t& given) {
+            options_.weights = given.back() == "only" ? Weighting::kOnly : Weighting::kAsNeeded;
+            return true;
+          },
+          "auto: of points where tilings do not make stars agree; only: no tilings, the weighted "
+          "tangential Delaunay complex")
+      ->check(CLI::IsMember({"auto", "only"}))
+      ->type_name("HOW")
       ->default_str("auto");
   command_->add_flag(
       "--steiner", options_.steiner,
