@@ -44,8 +44,8 @@ class FlippedBits : public testing::JournalTest {
     const auto journal = Open();
     RunMesh(Named(journal.get(), 3));
     const auto under_way = WriteRounds(journal.get(), 3, 50);
-    // Until the threads of the journal have nothing more to do: the mark comes last. The WAL is empty
-    // where they have carried all of it into the database by then.
+    // Until the threads of the journal have nothing more to do: the mark comes last. The WAL is
+    // empty where they have carried all of it into the database by then.
     std::map<std::string, std::string> before;
     do {
       before = files_;
