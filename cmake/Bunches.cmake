@@ -1,6 +1,6 @@
 # stellate_bunch(TARGET [ACROSS_ROOMS]): where CMAKE_UNITY_BUILD is on, sources are compiled at once
 # with others of their folder, eight at most: those tools/tidy.py reads at once, too, so names do not
-# meet. ACROSS_ROOMS: with others of the target, sixteen: what all of a library reads is then read,
+# meet. ACROSS_ROOMS: with others of the target, two dozen: what all of a library reads is then read,
 # and made code of, a few times.
 function(stellate_bunch target)
   cmake_parse_arguments(PARSE_ARGV 1 bunch "ACROSS_ROOMS" "" "")
@@ -10,7 +10,7 @@ function(stellate_bunch target)
   get_target_property(sources ${target} SOURCES)
   foreach(source ${sources})
     set(group all)
-    set(most 16)
+    set(most 24)
     if(NOT bunch_ACROSS_ROOMS)
       get_filename_component(folder ${source} ABSOLUTE)
       get_filename_component(folder ${folder} DIRECTORY)

@@ -18,7 +18,7 @@ namespace {
 
 using core::Message;
 
-constexpr auto kLook = std::chrono::milliseconds(250);
+constexpr auto kBetweenTurns = std::chrono::milliseconds(250);
 constexpr auto kTend = std::chrono::seconds(1);
 // For which a call is kept while its mesh goes from one server to another: a server that died is
 // missed for five seconds before another takes its meshes up.
@@ -119,7 +119,7 @@ void Router::Run(const std::stop_token& stop) {
   TimePoint tended;
   std::unique_lock lock(mutex_);
   while (!stop.stop_requested()) {
-    wake_.wait_for(lock, stop, kLook, [this] { return FirstDue() != nullptr; });
+    wake_.wait_for(lock, stop, kBetweenTurns, [this] { return FirstDue() != nullptr; });
     if (refuses_) continue;
     const auto asked = FirstDue();
     lock.unlock();
@@ -135,7 +135,7 @@ void Router::Run(const std::stop_token& stop) {
     if (at == asked_.end()) continue;  // there was none, or Refuse has told it
     if (const TimePoint now = Clock::now();
         route.kind == Route::Kind::kNotNow && now - asked->since < kMoving) {
-      asked->next = now + kLook;
+      asked->next = now + kBetweenTurns;
       asked_.splice(asked_.end(), asked_, at);  // others first
       continue;
     }
