@@ -16,6 +16,10 @@ constexpr double kLeastSine = 0.17364817766693033;
 // In mesh sizes: a walk ends at a way so short. A smooth manifold that turns as much along so short
 // a way has a curvature thousands of times that of the mesh size.
 constexpr double kShare = 1.0 / 2048;
+// A way up to so long, also in mesh sizes, whose turn is lost in each shorter way, is examined
+// before the walk goes on: an oracle that takes gradients by differences rounds every crease in its
+// tangents, though not in its points, over the length of a difference.
+constexpr double kLongestEnd = 1.0 / 16;
 constexpr int kMostLegs = 48;
 // A leg is no longer than this share of the one before; and no shorter than this one, lest it be
 // below the oracle's own differences, or rounding.
@@ -30,11 +34,14 @@ constexpr double kDifference = 1.0 / 128;  // ... tangents by differences
 // of its turn. Noise has no sides, and a curved manifold turns further there.
 constexpr double kBeyond = 8, kFarBeyond = 32, kNearest = 4;
 constexpr double kAgree = 1.0 / 3;
-constexpr double kOnTheWay = 0.6;    // the way's share of the turn between the sides
-constexpr double kStays = 0.3;       // of the distance from M of a step beyond a crease
-constexpr double kSharp = 0.1;       // of the way times its turn: M is so near where its sides meet
-constexpr double kOpposite = -0.95;  // cosine: a side continues in the opposite direction
-constexpr double kParallel = 0.05;   // singular values: directions do not meet
+constexpr double kOnTheWay = 0.35;  // the way's share of the turn between the sides
+constexpr double kStays = 0.3;      // of the distance from M of a step beyond a crease
+constexpr double kSharp = 0.1;      // of the way times its turn: M is so near where its sides meet
+// ... for a longer way. A round edge turns in more than a quarter of a way that has no shorter one
+// as steep, and passes where its sides meet at more than this.
+constexpr double kVerySharp = 0.03;
+constexpr double kOpposite = -0.95;    // cosine: a side continues in the opposite direction
+constexpr double kParallel = 0.05;     // singular values: directions do not meet
 constexpr double kFarthestCorner = 2;  // of a way's length, from its middle
 
 constexpr Eigen::Index kAsked = 8, kSteps = 4;  // steps, as far each of both
@@ -200,11 +207,27 @@ void CreaseProbe::GoOn() {
     looks_beyond_ = false;
     unconfirmed_ = WhatIsAt(walks_.front());
     if (unconfirmed_) return;
-    walks_.erase(walks_.begin());
+    LeaveEnd();
   } else {
-    std::erase_if(walks_, [&](Walk& walk) { return !TakeLeg(&walk) || walk.legs >= kMostLegs; });
+    std::erase_if(walks_, [&](Walk& walk) { return !GoesOn(&walk); });
   }
   ChooseEnd();
+}
+
+// Continues the walk, or lets it end early. Returns false if it can do neither.
+bool CreaseProbe::GoesOn(Walk* walk) const {
+  walk->next = NextLeg(*walk);
+  const bool is_lost = !walk->next || !walk->next->is_steep;
+  walk->ends_early = is_lost && !walk->has_ended_early && walk->way.length() <= kLongestEnd * size_;
+  return walk->ends_early || TakeLeg(walk);
+}
+
+// Continues the first walk, which has ended early at no crease. Drops it if it has ended.
+void CreaseProbe::LeaveEnd() {
+  Walk& walk = walks_.front();
+  const bool was_early = std::exchange(walk.ends_early, false);
+  walk.has_ended_early = true;
+  if (!was_early || !TakeLeg(&walk)) walks_.erase(walks_.begin());
 }
 
 // M reaches the point where its sides meet if that is a crease; a rounded or passing manifold stays
@@ -212,50 +235,53 @@ void CreaseProbe::GoOn() {
 void CreaseProbe::TakeCorner(const AnswerBlock& answer) {
   const bool found = answer.found.empty() || answer.found.front() != 0;
   const double off = (answer.points.col(0) - unconfirmed_->point).norm();
-  if (!found || off <= kSharp * turn_ * unconfirmed_->length) {
+  const double sharp = walks_.front().ends_early ? kVerySharp : kSharp;
+  if (!found || off <= sharp * turn_ * unconfirmed_->length) {
     crease_ = std::move(unconfirmed_);
     unconfirmed_.reset();
     return;
   }
   unconfirmed_.reset();
-  walks_.erase(walks_.begin());
+  LeaveEnd();
   ChooseEnd();
 }
 
 void CreaseProbe::ChooseEnd() {
   const auto ends = std::find_if(walks_.begin(), walks_.end(), [&](const Walk& walk) {
-    return walk.way.length() <= kShare * size_;
+    return walk.ends_early || walk.way.length() <= kShare * size_;
   });
   if (ends == walks_.end()) return;
   std::swap(*ends, walks_.front());
   looks_beyond_ = true;
 }
 
-// Takes the shortest way between two points found on which the tangent spaces still turn as much;
+// Returns the shortest way between two points found on which the tangent spaces still turn as much;
 // if there is none, on which they turn half as much.
-bool CreaseProbe::TakeLeg(Walk* walk) const {
-  const double length = walk->way.length();
-  std::optional<Way> next;
-  double shortest = 0, sine = 0;
-  bool is_steep = false;
-  const std::vector<Node>& nodes = walk->nodes;
+std::optional<CreaseProbe::Leg> CreaseProbe::NextLeg(const Walk& walk) const {
+  const double length = walk.way.length();
+  std::optional<Leg> next;
+  double shortest = 0;
+  const std::vector<Node>& nodes = walk.nodes;
   for (std::size_t i = 0; i < nodes.size(); ++i)
     for (std::size_t j = 0; j < i; ++j) {
       const double apart = (nodes[i].point - nodes[j].point).norm();
       if (apart > kLongestLeg * length || apart < kShortestLeg * length) continue;
       const double turn = SineBetween(nodes[j].basis, nodes[i].basis);
-      if (turn < std::max(kLeastSine, kKeptSine * walk->sine)) continue;
-      const bool steep = turn >= kSteepSine * walk->sine;
-      if (next && (is_steep == steep ? apart >= shortest : is_steep)) continue;
-      next = Way{nodes[j].point, nodes[i].point, nodes[j].basis, nodes[i].basis};
+      if (turn < std::max(kLeastSine, kKeptSine * walk.sine)) continue;
+      const bool steep = turn >= kSteepSine * walk.sine;
+      if (next && (next->is_steep == steep ? apart >= shortest : next->is_steep)) continue;
+      next = Leg{{nodes[j].point, nodes[i].point, nodes[j].basis, nodes[i].basis}, turn, steep};
       shortest = apart;
-      sine = turn;
-      is_steep = steep;
     }
-  if (!next) return false;
-  walk->way = std::move(*next);
-  walk->sine = sine;
-  ++walk->legs;
+  return next;
+}
+
+// Returns false if there is no next leg, or the walk has had too many.
+bool CreaseProbe::TakeLeg(Walk* walk) {
+  if (!walk->next || ++walk->legs >= kMostLegs) return false;
+  walk->way = std::move(walk->next->way);
+  walk->sine = walk->next->sine;
+  walk->next.reset();
   return true;
 }
 

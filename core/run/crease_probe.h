@@ -61,11 +61,18 @@ class CreaseProbe final : public QuerySource {
     Eigen::VectorXd point;
     Eigen::MatrixXd basis;
   };
+  struct Leg {
+    Way way;
+    double sine = 0;
+    bool is_steep = false;  // turns nearly as much as the way before it
+  };
   struct Walk {
     Way way;
     double sine = 0;
     int legs = 0;
     std::vector<Node> nodes = {};  // what was found about it last
+    std::optional<Leg> next = {};
+    bool ends_early = false, has_ended_early = false;
   };
 
   Eigen::MatrixXd PointsAbout(const Way& way) const;
@@ -74,7 +81,10 @@ class CreaseProbe final : public QuerySource {
   void TakePoints(const AnswerBlock& answer);
   void TakeTangents();
   void GoOn();
-  bool TakeLeg(Walk* walk) const;
+  bool GoesOn(Walk* walk) const;
+  std::optional<Leg> NextLeg(const Walk& walk) const;
+  static bool TakeLeg(Walk* walk);
+  void LeaveEnd();
   std::optional<Crease> WhatIsAt(const Walk& walk);
   void TakeCorner(const AnswerBlock& answer);
   void ChooseEnd();

@@ -161,6 +161,52 @@ Shape BoxWithoutEdges() {
   return shape;
 }
 
+// |x| + |y| = 1 in the plane z = 0: a closed curve with four corners.
+Shape Square() {
+  return {"square", 1,
+          [](const Vector3d& x) {
+            std::vector<Candidate> sides;
+            for (const double i : {-1.0, 1.0})
+              for (const double j : {-1.0, 1.0}) {
+                const double at = std::clamp((1 + i * x[0] - j * x[1]) / 2, 0.0, 1.0);
+                sides.push_back({Vector3d(i * at, j * (1 - at), 0),
+                                 {Vector3d(i, j, 0).normalized(), Vector3d::UnitZ()}});
+              }
+            return sides;
+          },
+          [](const Vector3d& x) {
+            return std::min(std::hypot(std::abs(x[0]) - 1, x[1]),
+                            std::hypot(x[0], std::abs(x[1]) - 1));
+          }};
+}
+
+// The shape with first normals that are differences of f over `step`, as those of a client without
+// derivatives: nearer to an edge than that they mix both sides.
+Shape ByDifferences(Shape shape, double step, std::function<double(const Vector3d&)> f) {
+  shape.name += " by differences";
+  shape.candidates = [step, f = std::move(f), of = shape.candidates](const Vector3d& x) {
+    std::vector<Candidate> all = of(x);
+    for (Candidate& c : all)
+      for (int i = 0; i < 3; ++i) {
+        const Vector3d along = step * Vector3d::Unit(i);
+        c.normals[0][i] = (f(c.point + along) - f(c.point - along)) / (2 * step);
+      }
+    return all;
+  };
+  return shape;
+}
+
+Shape SquareByDifferences(double step) {
+  return ByDifferences(Square(), step,
+                       [](const Vector3d& x) { return std::abs(x[0]) + std::abs(x[1]); });
+}
+
+Shape BoxByDifferences(double step) {
+  return ByDifferences(SharpBox(), step, [](const Vector3d& x) {
+    return (x.cwiseAbs() - Vector3d(1, 1, 0.3)).maxCoeff();
+  });
+}
+
 // Unit circles about the origin, in two planes that meet in the first axis.
 Shape CrossingCircles() {
   return {"crossing circles", 1,
@@ -226,11 +272,13 @@ TEST_P(Creases, EndTheRunSoonWithTheirPlace) {
     }
 }
 
-INSTANTIATE_TEST_SUITE_P(Shapes, Creases,
-                         ::testing::Combine(::testing::Values(TwoBalls(true, 1), TwoBalls(false, 1),
-                                                              SharpBox(), BoxWithoutEdges(),
-                                                              CrossingCircles(), CrossingSpheres()),
-                                            ::testing::Bool()));
+INSTANTIATE_TEST_SUITE_P(
+    Shapes, Creases,
+    ::testing::Combine(::testing::Values(TwoBalls(true, 1), TwoBalls(false, 1), SharpBox(),
+                                         BoxWithoutEdges(), Square(), SquareByDifferences(2e-3),
+                                         SquareByDifferences(2e-5), BoxByDifferences(2e-3),
+                                         CrossingCircles(), CrossingSpheres()),
+                       ::testing::Bool()));
 
 // An edge that is rounded by a thousandth of the mesh size, and tubes and gaps far below it.
 TEST(SmoothManifolds, AreNeverCalledCreased) {

@@ -43,6 +43,34 @@ def test_cylinders_of_one_radius_cross(server):
     np.testing.assert_allclose([abs(at[0]), at[1], at[2]], [1, 0, 0], atol=1e-3)
 
 
+@pytest.mark.parametrize("epsilon", [0.2, 0.05, 0.005])
+def test_a_square_has_corners_however_fine_its_mesh(server, epsilon):
+    # f's differences, from which the tangent spaces come, take both sides of a corner together.
+    square = stellate.ImplicitManifold(
+        lambda x: np.abs(x).sum(axis=1, keepdims=True) - 1,
+        ambient_dimension=2,
+        dimension=1,
+        bounding_box=([-2, -2], [2, 2]),
+    )
+    mesh = stellate.mesh(square, epsilon, server=server)
+    at = place(mesh.report.certificate.verdict, "has a crease")
+    np.testing.assert_allclose(np.sort(np.abs(at)), [0, 1], atol=1e-4)
+
+
+@pytest.mark.parametrize("epsilon", [0.05, 0.0053])
+def test_a_curve_with_kinks_is_not_called_too_coarse(server, epsilon):
+    def f(x):
+        a, b, c, p, q = x.T
+        return np.stack([a**2 + b**2 - 1, c - a * b, p - a**3, q - np.abs(b)], axis=1)
+
+    curve = stellate.ImplicitManifold(
+        f, ambient_dimension=5, dimension=1, bounding_box=([-2] * 5, [2] * 5)
+    )
+    mesh = stellate.mesh(curve, epsilon, server=server)
+    at = place(mesh.report.certificate.verdict, "has a crease")
+    np.testing.assert_allclose([abs(at[0]), *at[[1, 2, 4]]], [1, 0, 0, 0], atol=1e-4)
+
+
 def cube(x):
     return np.abs(x).max(axis=1) - 1
 
