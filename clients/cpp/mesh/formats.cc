@@ -8,6 +8,7 @@
 #include <string_view>
 #include <utility>
 
+#include "mesh/parts.h"
 #include "mesh/surface.h"
 
 namespace stellate::client {
@@ -161,6 +162,8 @@ TextLayout Msh(const FileShape& shape) {
 
 Expected<std::string> Stl(const Mesh& mesh) {
   const auto [points, triangles] = DrawnOf(mesh);
+  if (auto ok = CheckSinglePrecision(points, triangles, "STL"); !ok)
+    return tl::unexpected(ok.error());
   std::string bytes(80, ' ');  // a header that says nothing, and never "solid"
   const auto add = [&bytes](const auto& value) {
     bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
@@ -170,12 +173,6 @@ Expected<std::string> Stl(const Mesh& mesh) {
     Eigen::Matrix3d corners;
     for (Eigen::Index i = 0; i < 3; ++i) corners.col(i) = points.col(triangles(i, j));
     const Eigen::Matrix3f single = corners.cast<float>();
-    if (single.col(0) == single.col(1) || single.col(1) == single.col(2) ||
-        single.col(2) == single.col(0)) {
-      return Fail(ErrorCode::kFileFailed,
-                  "STL has single precision, in which vertices of this mesh fall together: save it "
-                  "as .ply, or move it nearer to the origin");
-    }
     const Eigen::Vector3d normal =
         (corners.col(1) - corners.col(0)).cross(corners.col(2) - corners.col(0)).normalized();
     const Eigen::Vector3f rounded = normal.cast<float>();

@@ -79,9 +79,12 @@ std::unique_ptr<MeshWriter> MakePlyWriter(Draft draft, const FileShape& shape);
 std::unique_ptr<MeshWriter> MakeVtuWriter(Draft draft, FileShape shape,
                                           const std::vector<Group>* groups = nullptr);
 
-// The whole file, binary, little endian. kFileFailed for a mesh that is too fine for single
-// precision.
+// Whole files, binary, little endian. kFileFailed for a mesh that is too fine for single precision,
+// which .stl and .glb have, and of the latter two for one without triangles.
+Expected<std::string> Npz(const Mesh& mesh);
 Expected<std::string> Stl(const Mesh& mesh);
+Expected<std::string> ThreeMf(const Mesh& mesh);
+Expected<std::string> Glb(const Mesh& mesh);
 
 // The first three coordinates of each point, zeros added.
 Eigen::MatrixXd InSpace(const Eigen::Ref<const Eigen::MatrixXd>& points);

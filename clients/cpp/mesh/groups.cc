@@ -1,6 +1,7 @@
 #include "mesh/groups.h"
 
 #include <algorithm>
+#include <bit>
 #include <cstddef>
 #include <iterator>
 #include <map>
@@ -51,38 +52,11 @@ void Turn(Group* facets_of, const SimplexMatrix& cells, const std::vector<std::u
   }
 }
 
-// A name without what file formats take for something else: .obj has spaces between names of
-// groups, .msh quotes around them. "region_1" where there is none, or another region has it, too.
-std::string NameOf(int label, const std::vector<std::string>& names) {
-  const auto cleaned = [&names](size_t i) {
-    std::string name;
-    for (const char c : names[i]) name += c == ' ' || c == '"' || c == '\\' ? '_' : c;
-    return name;
-  };
-  const auto at = static_cast<size_t>(label) - 1;
-  if (at < names.size() && !names[at].empty()) {
-    std::string name = cleaned(at);
-    bool alone = true;
-    for (size_t i = 0; i < names.size(); ++i) alone = alone && (i == at || cleaned(i) != name);
-    if (alone) return name;
-  }
-  return "region_" + std::to_string(label);
-}
-
 Group GroupOf(Face face, std::ptrdiff_t tag) {
-  Group group{static_cast<int>(tag), face.walls.size() > 1 ? "walls" : "wall", 0,
-              std::move(face.simplices)};
-  for (const int wall : face.walls) {
-    group.name += '_';
-    group.name += std::to_string(wall);
-    group.walls |= std::uint64_t{1} << wall;
-  }
-  return group;
+  std::uint64_t walls = 0;
+  for (const int wall : face.walls) walls |= std::uint64_t{1} << wall;
+  return {static_cast<int>(tag), WallName(walls), walls, std::move(face.simplices)};
 }
-
-}  // namespace
-
-namespace {
 
 // A boundary without its inside: its walls, and where they meet.
 std::vector<Group> GroupsOfBoundary(const Mesh& mesh) {
@@ -110,6 +84,29 @@ std::vector<Group> GroupsOfBoundary(const Mesh& mesh) {
 
 }  // namespace
 
+std::string RegionName(int label, const std::vector<std::string>& names) {
+  const auto cleaned = [&names](size_t i) {
+    std::string name;
+    for (const char c : names[i]) name += c == ' ' || c == '"' || c == '\\' ? '_' : c;
+    return name;
+  };
+  const auto at = static_cast<size_t>(label) - 1;
+  if (at < names.size() && !names[at].empty()) {
+    std::string name = cleaned(at);
+    bool alone = true;
+    for (size_t i = 0; i < names.size(); ++i) alone = alone && (i == at || cleaned(i) != name);
+    if (alone) return name;
+  }
+  return "region_" + std::to_string(label);
+}
+
+std::string WallName(std::uint64_t walls) {
+  std::string name = std::popcount(walls) > 1 ? "walls" : "wall";
+  if (walls == 0) return "";
+  for (; walls != 0; walls &= walls - 1) name += "_" + std::to_string(std::countr_zero(walls));
+  return name;
+}
+
 std::vector<Group> GroupsOf(const Mesh& mesh, const std::vector<std::uint8_t>& known) {
   if (mesh.is_boundary()) return GroupsOfBoundary(mesh);
   SimplexMatrix cells = OrientedSimplices(mesh);
@@ -127,7 +124,7 @@ std::vector<Group> GroupsOf(const Mesh& mesh, const std::vector<std::uint8_t>& k
     labels.insert(labels.end(), columns.size(), label);
     const bool is_all = regions.size() == 1 && mesh.region_names.empty();
     groups.push_back({static_cast<int>(groups.size()) + 1,
-                      is_all ? "inside" : NameOf(label, mesh.region_names), 0,
+                      is_all ? "inside" : RegionName(label, mesh.region_names), 0,
                       cells(Eigen::all, columns), label});
   }
   if (!by_region.empty()) cells = SimplexMatrix(cells(Eigen::all, by_region));

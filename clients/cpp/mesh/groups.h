@@ -30,4 +30,11 @@ struct Group {
 // which has the labels `known`, too.
 std::vector<Group> GroupsOf(const Mesh& mesh, const std::vector<std::uint8_t>& known = {});
 
+// A name without what file formats take for something else: .obj has spaces between names of
+// groups, .msh quotes around them. "region_1" where there is none, or another region has it, too.
+std::string RegionName(int label, const std::vector<std::string>& names);
+
+// Of walls as bits: "wall_0", "walls_0_1", ...; of none "".
+std::string WallName(std::uint64_t walls);
+
 }  // namespace stellate::client

@@ -32,12 +32,12 @@ struct FileFormat {
   int largest_ambient_dimension;
   const char* words;
   Holds holds;
-  TextLayout (*layout)(const FileShape& shape);  // null: it is binary
-  bool surface_of_solids = false;                // in space, besides
+  TextLayout (*layout)(const FileShape& shape);                   // null: it is binary
+  bool surface_of_solids = false;                                 // in space, besides
+  Expected<std::string> (*contents)(const Mesh& mesh) = nullptr;  // of what is written whole
 };
 
 constexpr int kAny = 1 << 30;
-constexpr const char* kStl = ".stl";
 constexpr const char* kPly = ".ply";
 constexpr FileFormat kFormats[] = {
     {".txt", 0, kAny, kAny, "anything", Holds::kRows, client::Txt},
@@ -47,9 +47,15 @@ constexpr FileFormat kFormats[] = {
      client::Obj, true},
     {kPly, 1, 2, 3, "curves and surfaces, and the surfaces of solids in space", Holds::kDrawn,
      nullptr, true},
-    {kStl, 2, 2, 3, "surfaces, and the surfaces of solids in space", Holds::kDrawn, nullptr, true},
+    {".stl", 2, 2, 3, "surfaces, and the surfaces of solids in space", Holds::kDrawn, nullptr, true,
+     client::Stl},
+    {".3mf", 2, 2, 3, "surfaces, and the surfaces of solids in space", Holds::kDrawn, nullptr, true,
+     client::ThreeMf},
+    {".glb", 2, 2, 3, "surfaces, and the surfaces of solids in space", Holds::kDrawn, nullptr, true,
+     client::Glb},
     {".msh", 1, 3, 3, "simplices of dimension 3 at most", Holds::kGroups, client::Msh},
     {".vtu", 1, 3, kAny, "simplices of dimension 3 at most", Holds::kGroups, nullptr},
+    {".npz", 0, kAny, kAny, "anything", Holds::kRows, nullptr, false, client::Npz},
 };
 
 bool CanHold(const FileFormat& format, int k, int d) {
@@ -84,8 +90,6 @@ Expected<const FileFormat*> Choose(const std::string& path, int k, int d) {
                   " would get a mesh of dimension " + std::to_string(k) + " in R^" +
                   std::to_string(d) + "; known for it:" + able);
 }
-
-bool IsStl(const FileFormat& format) { return format.ending == kStl; }
 
 std::unique_ptr<MeshWriter> WriterOf(const FileFormat& format, client::Draft draft,
                                      const FileShape& shape,
@@ -164,8 +168,8 @@ Expected<void> CheckSave(const std::string& path, int dimension, int ambient_dim
 Expected<void> Mesh::Save(const std::string& path) const {
   const auto format = Choose(path, dimension(), ambient_dimension());
   if (!format) return tl::unexpected(format.error());
-  if (IsStl(**format)) {
-    const Expected<std::string> bytes = client::Stl(*this);
+  if ((*format)->contents != nullptr) {
+    const Expected<std::string> bytes = (*format)->contents(*this);
     if (!bytes) return tl::unexpected(bytes.error());
     return client::WriteFile(path, *bytes);
   }
@@ -178,7 +182,7 @@ namespace client {
 
 bool CanStream(const std::string& path, int k, int d, bool has_walls, bool is_boundary) {
   const auto format = Choose(path, k, d);
-  if (!format || IsStl(**format) || Draft::IsSpecial(path)) return false;
+  if (!format || (*format)->contents != nullptr || Draft::IsSpecial(path)) return false;
   const Holds holds = (*format)->holds;
   if (holds == Holds::kRows) return true;
   if (holds == Holds::kDrawn) return k < 3;

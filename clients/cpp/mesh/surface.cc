@@ -1,6 +1,8 @@
 #include "mesh/surface.h"
 
 #include <algorithm>
+#include <cstddef>
+#include <iterator>
 #include <utility>
 #include <vector>
 
@@ -39,18 +41,22 @@ SimplexMatrix BoundaryOf(const SimplexMatrix& simplices) {
   return facets(Eigen::all, alone);
 }
 
+Drawn WithTheirPoints(const Eigen::MatrixXd& points, SimplexMatrix simplices) {
+  std::vector<Index> place(static_cast<std::size_t>(points.cols()), -1), used;
+  for (const Vertex id : simplices.reshaped()) place[id] = 0;
+  for (std::size_t id = 0; id < place.size(); ++id) {
+    if (place[id] < 0) continue;
+    place[id] = std::ssize(used);
+    used.push_back(static_cast<Index>(id));
+  }
+  for (Vertex& id : simplices.reshaped()) id = static_cast<Vertex>(place[id]);
+  return {points(Eigen::all, used), std::move(simplices)};
+}
+
 Drawn DrawnOf(const Mesh& mesh) {
   Drawn drawn{InSpace(mesh.points), OrientedSimplices(mesh)};
   if (mesh.dimension() != 3) return drawn;
-  drawn.simplices = BoundaryOf(drawn.simplices);
-  std::vector<Vertex> used(drawn.simplices.reshaped().begin(), drawn.simplices.reshaped().end());
-  std::sort(used.begin(), used.end());
-  used.erase(std::unique(used.begin(), used.end()), used.end());
-  for (Vertex& vertex : drawn.simplices.reshaped()) {
-    vertex = static_cast<Vertex>(std::lower_bound(used.begin(), used.end(), vertex) - used.begin());
-  }
-  drawn.points = Eigen::MatrixXd(drawn.points(Eigen::all, used));
-  return drawn;
+  return WithTheirPoints(drawn.points, BoundaryOf(drawn.simplices));
 }
 
 }  // namespace stellate::client

@@ -15,6 +15,9 @@ struct Drawn {
 };
 Drawn DrawnOf(const Mesh& mesh);
 
+// The simplices, and of the points (3 x n) those that they have, in their order.
+Drawn WithTheirPoints(const Eigen::MatrixXd& points, SimplexMatrix simplices);
+
 // The facets of one simplex alone, as it induces their orientation.
 SimplexMatrix BoundaryOf(const SimplexMatrix& simplices);
 

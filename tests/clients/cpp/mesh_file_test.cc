@@ -2,10 +2,12 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
@@ -17,6 +19,8 @@
 #include <vector>
 
 #include "mesh/groups.h"
+#include "mesh/write_file.h"
+#include "mesh/zip.h"
 #include "stellate/mesh.h"
 
 namespace stellate {
@@ -50,6 +54,14 @@ class MeshFile : public ::testing::Test {
 
   std::filesystem::path directory_;
 };
+
+// The exit status of a line of Python with that argument.
+int InPython(const std::string& line, const std::string& argument) {
+  const std::string command =
+      "/usr/bin/python3 -B -c \"import sys; " + line + "\" '" + argument + "'";
+  const int status = std::system(command.c_str());
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
 
 // A tetrahedron's boundary in R^d, with numbers that do not fit into few digits.
 Mesh Surface(int d) {
@@ -293,7 +305,7 @@ TEST_F(MeshFile, RefusesWhatAFormatCannotHold) {
   solid.simplices = SimplexMatrix(4, 1);
   solid.simplices << 0, 1, 2, 3;
   solid.points = Surface(4).points;
-  for (const std::string ending : {".off", ".ply", ".obj", ".stl"}) {
+  for (const std::string ending : {".off", ".ply", ".obj", ".stl", ".3mf", ".glb"}) {
     EXPECT_NE(Refusal(solid, "a" + ending).find("surfaces of solids in space, and"),
               std::string::npos)
         << ending;
@@ -305,7 +317,8 @@ TEST_F(MeshFile, RefusesWhatAFormatCannotHold) {
   EXPECT_NE(Refusal(thick, "a.vtu").find("dimension 4"), std::string::npos);
   EXPECT_NE(Refusal(thick, "a.stl").find("surfaces"), std::string::npos);
   EXPECT_NE(Refusal(thick, "a.wkt").find("'.wkt'"), std::string::npos);
-  EXPECT_NE(Refusal(Surface(4), "a.stl").find("known for it: .txt .off .vtu"), std::string::npos);
+  EXPECT_NE(Refusal(Surface(4), "a.stl").find("known for it: .txt .off .vtu .npz"),
+            std::string::npos);
   EXPECT_NE(Refusal(Surface(4), "a.msh").find("points of space"), std::string::npos);
   EXPECT_NE(Refusal(thick, "a.msh").find("dimension 3 at most"), std::string::npos);
   EXPECT_NE(Refusal(thick, "plain").find(".txt"), std::string::npos);
@@ -406,6 +419,61 @@ TEST_F(MeshFile, StlHoldsTrianglesWithNormalsOutwards) {
   }
   mesh.points.colwise() += Eigen::Vector3d(1e9, 0, 0);
   EXPECT_NE(Refusal(mesh, "b.stl").find("single precision"), std::string::npos);
+}
+
+TEST_F(MeshFile, PartsHaveTrianglesAndNamesThatXmlAndJsonTake) {
+  Mesh mesh = Surface(3);
+  mesh.points.setZero();
+  mesh.points.rightCols(3).setIdentity();
+  mesh.sides = {{1, 0}, {0, 1}, {1, 0}, {0, 1}};
+  mesh.walls = {1, 1, 1, 1};
+  mesh.region_names = {"<a> & \"b\""};
+  const std::string glb = Saved(mesh, "a.glb");
+  EXPECT_NE(glb.find(R"("name": "<a>_&__b__wall_0")"), std::string::npos) << glb;
+  EXPECT_EQ(Saved(mesh, "a.3mf").substr(0, 4), "PK\3\4");
+  mesh.points.colwise() += Eigen::Vector3d(1e9, 0, 0);
+  EXPECT_NE(Refusal(mesh, "b.glb").find(".glb has single precision"), std::string::npos);
+  mesh.simplices.resize(3, 0);
+  for (const std::string ending : {".3mf", ".glb"})
+    EXPECT_NE(Refusal(mesh, "b" + ending).find("no triangle, and " + ending), std::string::npos);
+}
+
+TEST_F(MeshFile, NpzHoldsNamesOfAnyCharacters) {
+  Mesh mesh = Surface(3);
+  mesh.labels = {1, 2, 1, 2};
+  mesh.region_names = {"\xc3\xa9t\xc3\xa9", "", "\xff"};  // the last is no UTF-8
+  Saved(mesh, "a.npz");
+  EXPECT_EQ(
+      InPython("import numpy; a = numpy.load(sys.argv[1]); names = a['region_names'].tolist(); "
+               "sys.exit(names != ['\\xe9t\\xe9', '', '\\ufffd'] or a['labels'].tolist() != [1, 2, "
+               "1, 2])",
+               Path("a.npz")),
+      0);
+}
+
+TEST_F(MeshFile, AnotherProgramReadsZipFilesOfBothKinds) {
+  for (const std::uint64_t largest : {0xFFFFFFFEull, 200ull, 0ull}) {
+    client::Zip zip(largest);
+    std::string noise;
+    std::uint64_t state = 1;
+    for (int i = 0; i < 100'000; ++i)
+      noise += static_cast<char>((state *= 6364136223846793005u) >> 60);
+    zip.Add("empty", "");
+    zip.Add("small", "abc");
+    zip.Add("noise", noise);
+    zip.Add("zeros", std::string(300'000, '\0'));
+    zip.Add("last", "z");
+    ASSERT_TRUE(client::WriteFile(Path("a.zip"), zip.Finish()).has_value());
+    std::ofstream(Path("noise"), std::ios::binary) << noise;
+    EXPECT_EQ(
+        InPython("import zipfile; z = zipfile.ZipFile(sys.argv[1]); "
+                 "noise = open(sys.argv[1][:-5] + 'noise', 'rb').read(); "
+                 "wanted = [b'', b'abc', noise, bytes(300000), b'z']; "
+                 "sys.exit(z.testzip() is not None or [z.read(n) for n in z.namelist()] != wanted)",
+                 Path("a.zip")),
+        0)
+        << largest;
+  }
 }
 
 TEST_F(MeshFile, AFileIsReplacedWholeOrNotAtAll) {

@@ -146,6 +146,9 @@ def test_glb_is_refused_where_vertices_would_fall_together(tmp_path):
         far.save(tmp_path / "far.glb")
     assert not list(tmp_path.iterdir())
     for ending in (".glb", ".3mf"):
+        nothing = stellate.Mesh(np.eye(3), np.empty((0, 3), dtype=int))
+        with pytest.raises(stellate.SaveError, match=f"no triangle, and {ending}"):
+            nothing.save(tmp_path / f"nothing{ending}")
         with pytest.raises(stellate.SaveError, match="dimension 1"):
             shapes.polygon(5, 3).save(tmp_path / f"polygon{ending}")
 

@@ -81,10 +81,16 @@ struct Mesh {
   //   .obj  curves and surfaces, d <= 3, text
   //   .ply  curves and surfaces, d <= 3, binary, in double precision
   //   .stl  surfaces of space, binary, in single precision as the format has it
-  //   Of a solid (k = d = 3) these four hold the surface, outwards, around a cavity into that.
+  //   .3mf  surfaces of space, for 3D printers, in millimetres: an object for each region
+  //   .glb  surfaces of space, for Blender and browsers: a node for each region, smooth normals and
+  //         a material for each wall, in single precision, z upwards
+  //   Of a solid (k = d = 3) these six hold the surface, outwards, around a cavity into that.
   //   .msh  k <= 3, d <= 3: Gmsh's, version 2.2, text
   //   .vtu  k <= 3; beyond d = 3 the first three coordinates, and all as point data "coordinates";
   //         field data "epsilon", "certified" (0 or 1), "verdict" and "version" (UTF-8 bytes)
+  //   .npz  any k and d, exact, for numpy.load: arrays "points" (n, d), "simplices" (m, k+1), and
+  //         where there are some "walls" (n,), "labels" (m,), "region_names"; of the boundary alone
+  //         "labels" (m, 2), its sides; of a mesh that is over "certified", "verdict", "epsilon"
   // Of a mesh with boundary .msh, .vtu and .obj have its faces too, of all dimensions, after its
   // simplices: in .msh as physical groups "inside", or where there are several regions by the
   // region's name, "region_1" for label 1 if it has none, "wall_0", ..., "walls_0_1", ...; in .obj
@@ -93,8 +99,8 @@ struct Mesh {
   // "walls". With labels .vtu has cell data "region", a simplex's label, 0 of faces, and "sides",
   // of the faces of dimension k - 1 the labels that they face away from and face (0, 0 of others).
   // Faces between regions are among them, turned outwards from the lower label. All
-  // but .txt are oriented as by OrientedSimplices(mesh). The file is replaced when the new one is
-  // whole. kFileFailed when the format cannot hold the mesh or the file cannot be written.
+  // but .txt and .npz are oriented as by OrientedSimplices(mesh). The file is replaced when the new
+  // one is whole. kFileFailed when the format cannot hold the mesh or the file cannot be written.
   Expected<void> Save(const std::string& path) const;
 };
 

@@ -54,7 +54,7 @@ class _Scene:
 
 def contents(mesh: Complex, cells: np.ndarray) -> bytes:
     """The file of a surface of space, or of a solid, with these cells."""
-    every = parts(mesh, cells)
+    every = parts(mesh, cells, ".glb")
     insist_on_single_precision(every, ".glb")
     scene = _Scene()
     meshes = [{"name": p.name, "primitives": _primitives(scene, p)} for p in every]

@@ -31,8 +31,13 @@ class Part:
     closed: bool
 
 
-def parts(mesh: Complex, cells: np.ndarray) -> list[Part]:
-    """Of a surface with these cells, or of a solid, in space: a part for each region, or one in all."""
+def parts(mesh: Complex, cells: np.ndarray, ending: str) -> list[Part]:
+    """Of a surface with these cells, or of a solid, in space: a part for each region, or one in all.
+
+    Raises: SaveError where there is no triangle; `ending`: of the file, for the error.
+    """
+    if not len(cells):
+        raise SaveError(f"the mesh has no triangle, and {ending} holds nothing else")
     known = () if mesh.labels is None else np.unique(mesh.labels[mesh.labels > 0]).tolist()
     if len(known) < 2 and not mesh.region_names:
         return [_part("surface", mesh, cells)]

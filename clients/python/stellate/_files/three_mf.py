@@ -36,7 +36,7 @@ def contents(mesh: Complex, cells: np.ndarray) -> bytes:
         for name, text in (
             ("[Content_Types].xml", _TYPES),
             ("_rels/.rels", _RELATIONS),
-            ("3D/3dmodel.model", "\n".join(_model(parts(mesh, cells))) + "\n"),
+            ("3D/3dmodel.model", "\n".join(_model(parts(mesh, cells, ".3mf"))) + "\n"),
         ):
             archive.writestr(
                 zipfile.ZipInfo(name, _AS_OF), text, compress_type=zipfile.ZIP_DEFLATED
