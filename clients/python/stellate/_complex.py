@@ -29,6 +29,9 @@ class Complex(Protocol):
     def region_names(self) -> tuple[str, ...]: ...
 
     @property
+    def coordinate_names(self) -> tuple[str, ...]: ...
+
+    @property
     def report(self) -> Report | None: ...
 
     @property

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ _INSTALL = {
     "pyvista": "pip install pyvista",
     "trimesh": "pip install trimesh",
     "open3d": "apt-get install python3-open3d, or pip install open3d",
+    "pandas": "apt-get install python3-pandas, or pip install pandas",
     "gudhi": "apt-get install python3-gudhi, or pip install gudhi",
 }
 
@@ -55,6 +57,19 @@ def to_open3d(mesh: Complex, cells: np.ndarray) -> Any:
     if mesh.dimension == 1:
         return open3d.geometry.LineSet(points, open3d.utility.Vector2iVector(cells))
     return open3d.geometry.TriangleMesh(points, open3d.utility.Vector3iVector(cells))
+
+
+def to_pandas(mesh: Complex, names: Sequence[str] | None) -> Any:
+    """Mesh.to_pandas."""
+    pandas, d = _module("pandas"), mesh.ambient_dimension
+    if names is None:
+        names = mesh.coordinate_names or (
+            list("xyz"[:d]) if d <= 3 else [f"x{i}" for i in range(d)]
+        )
+    if isinstance(names, str) or len(names) != d:
+        raise InvalidArgument(f"names have to be {d}, one for each coordinate, and are {names!r}")
+    index = pandas.RangeIndex(len(mesh.points), name="vertex")
+    return pandas.DataFrame(np.array(mesh.points), index=index, columns=list(names))
 
 
 def to_simplex_tree(mesh: Complex) -> Any:

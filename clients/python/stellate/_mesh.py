@@ -50,6 +50,7 @@ class Mesh:
         and that its certificate is about; None where they are the points.
       name: by which it is on its server still, "meshes/...", where it was asked to stay
         (`stellate.mesh(..., keep_on_server=True)`); else "".
+      coordinate_names: d, as the oracle or the table of the points had them; () where there are none.
     """
 
     points: np.ndarray
@@ -64,6 +65,7 @@ class Mesh:
     smoothed: np.ndarray | None = None
     region_names: tuple[str, ...] = ()
     name: str = ""
+    coordinate_names: tuple[str, ...] = ()
 
     def region(self, label: int | str) -> Mesh:
         """The part with one label, or with that name, of the same points. Its boundary is where it ends
@@ -84,9 +86,11 @@ class Mesh:
             sides = self.labels[on]
             alone = np.where(sides == label, sides, 0)  # what else is there is outside of it
             rows, revision = self.simplices[on], self.revision
-            return Mesh(self.points, rows, None, None, revision, self.walls, labels=alone)
-        rows = self.simplices[self.labels == label]
-        return Mesh(self.points, rows, None, None, self.revision, self.walls)
+            part = Mesh(self.points, rows, None, None, revision, self.walls, labels=alone)
+        else:
+            rows = self.simplices[self.labels == label]
+            part = Mesh(self.points, rows, None, None, self.revision, self.walls)
+        return dataclasses.replace(part, coordinate_names=self.coordinate_names)
 
     @property
     def is_boundary(self) -> bool:
@@ -425,6 +429,14 @@ class Mesh:
     def to_open3d(self) -> Any:
         """An open3d.geometry.TriangleMesh of a surface, a LineSet of a curve; d <= 3."""
         return _convert.to_open3d(self, formats.cells(self))
+
+    def to_pandas(self, names: Sequence[str] | None = None) -> Any:
+        """A pandas.DataFrame of the points: a row for each, by its number, and a column for each coordinate.
+
+        Its columns are called by `names`, d of them, else by `coordinate_names`, else x, y and z, or x0, x1,
+        ... where d > 3.
+        """
+        return _convert.to_pandas(self, names)
 
     def simplex_tree(self) -> Any:
         """A gudhi.SimplexTree of the mesh, all of it at the filtration value 0.

@@ -25,6 +25,12 @@ def tree_of(points: Array) -> Any:
     return cKDTree(points)
 
 
+def column_names(points: Any) -> tuple[str, ...]:
+    """Of a table whose columns have names, as a pandas.DataFrame; of other points ()."""
+    columns = getattr(points, "columns", None)
+    return () if columns is None else tuple(map(str, columns))
+
+
 def as_points(points: Any, what: str) -> Array:
     """(n, d), finite, of at least one row.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import os
 import sys
 import threading
@@ -16,6 +17,7 @@ from ._info import MeshInfo, unless_failed
 from ._interrupt import Interrupts
 from ._mesh import FinishedMesh
 from ._notebook import calm_output
+from ._point_sets import column_names
 from ._points import CheckedPoints, Noise, Weights
 from ._upload import Upload
 from .client import Client
@@ -61,7 +63,7 @@ def reconstruct(
         print(mesh.report)
 
     Args:
-      points: (n, d) finite numbers, an array or lists. Row i is vertex i of the mesh: labels and other
+      points: (n, d) finite numbers, an array, lists or a table, whose columns' names the mesh keeps. Row i is vertex i of the mesh: labels and other
         data of the points stay attached. None is moved, and none added unless by `steiner`.
       dimension: k of the manifold, 1 to 3, below d.
       tangents: (n, d, k), of each point a basis of the tangent space, its columns; they need not be
@@ -124,6 +126,7 @@ def reconstruct(
         if not isinstance(client, Client):
             client = stack.enter_context(Client(client, credentials))
         mesh = _run(client, checked, on_progress, interrupts)
+    mesh = dataclasses.replace(mesh, coordinate_names=column_names(points))
     for file in files:
         try:
             mesh.save(file)

@@ -161,6 +161,7 @@ class Run:
                 f"and is {on_progress!r}"
             )
         max_chunk = check_max_chunk(options.pop("max_chunk", None))
+        self._coordinate_names = CheckedOracle(oracle).coordinate_names
         self._scale: Scale | None = None
         if scale is not None:
             self._scale = Scale(scale, CheckedOracle(oracle).ambient_dimension)
@@ -430,6 +431,7 @@ class Run:
         mesh = self._places.in_mesh(mesh)
         if self._scale is not None:
             mesh = self._scale.mesh(mesh)
+        mesh = dataclasses.replace(mesh, coordinate_names=self._coordinate_names)
         report = mesh.report
         if report is None:
             return mesh

@@ -54,6 +54,7 @@ class Oracle(Protocol):
         A face is then asked for with all walls that are zero on it, although some follow from others.
       region_names: a str for each of the labels 1, 2, ..., for people and for the groups of files; ""
         where there is none. At most 128 bytes each.
+      coordinate_names: a str for each of the d coordinates; the mesh has them, and Mesh.to_pandas.
       jacobian(points (n, d)) -> (n, m, d): of the equations that M is given by, if it is. Only
         stellate.check asks, to find where they lose rank.
       coordinates(points (n, d)) -> (n, m): those that people know points of M by, where M lies in R^d
@@ -95,6 +96,7 @@ class CheckedOracle:
         self.labels = _labels(getattr(oracle, "labels", None), self.walls)
         self.closures = _closures(getattr(oracle, "closures", ()))
         self.region_names = _names(getattr(oracle, "region_names", ()))
+        self.coordinate_names = _names_of_coordinates(oracle, self.ambient_dimension)
         self.about = _sentence(getattr(oracle, "about", ""))
         self.bounding_box = _box(getattr(oracle, "bounding_box", None))
         seeds = getattr(oracle, "seeds", None)
@@ -316,6 +318,16 @@ def _labels(labels: Any, walls: int) -> bytes:
             "labels have to be whole numbers from 0, outside of M, to 127, or -1 where no point is"
         )
     return given.astype(np.int8).tobytes()
+
+
+def _names_of_coordinates(oracle: Any, d: int) -> tuple[str, ...]:
+    names = getattr(oracle, "coordinate_names", ())
+    fits = isinstance(names, (tuple, list)) and all(isinstance(name, str) for name in names)
+    if not fits or len(names) not in (0, d):
+        raise InvalidArgument(
+            f"coordinate_names have to be {d} str, one for each coordinate: {names!r}"
+        )
+    return tuple(names)
 
 
 def _names(names: Any) -> tuple[str, ...]:

@@ -1,5 +1,6 @@
 """Meshes in other programs' hands: meshio's plug-in, series for ParaView, tables in notebooks."""
 
+import dataclasses
 import html.parser
 import importlib
 import subprocess
@@ -143,12 +144,31 @@ def test_strange_words_are_escaped(hostile="<script>alert('x')</script> & \"more
     assert report.summary in shown(report) and report.summary in str(report)
 
 
-@pytest.mark.parametrize("convert", ["to_meshio", "to_pyvista", "to_trimesh", "to_open3d"])
+@pytest.mark.parametrize(
+    "convert", ["to_meshio", "to_pyvista", "to_trimesh", "to_open3d", "to_pandas"]
+)
 def test_a_library_that_is_not_there_is_named(convert, monkeypatch):
     name = convert[3:]
     monkeypatch.setitem(sys.modules, name, None)
     with pytest.raises(ImportError, match=f"no {name} here.*install"):
         getattr(shapes.torus(), convert)()
+
+
+def test_a_frame_has_the_names_of_coordinates():
+    pytest.importorskip("pandas")
+    torus = shapes.torus()
+    frame = torus.to_pandas()
+    assert list(frame) == ["x", "y", "z"] and frame.index.name == "vertex"
+    assert np.array_equal(frame.to_numpy(), torus.points)
+    frame.loc[0, "x"] = 7.0  # a copy
+    assert torus.points[0, 0] != 7
+    assert list(shapes.polygon(5, 4).to_pandas()) == ["x0", "x1", "x2", "x3"]
+    named = dataclasses.replace(torus, coordinate_names=("strain", "kelvin", "stress"))
+    assert list(named.to_pandas()) == ["strain", "kelvin", "stress"]
+    assert list(named.to_pandas(names=["a", "b", "c"])) == ["a", "b", "c"]
+    for wrong in (["a", "b"], "abc"):
+        with pytest.raises(stellate.InvalidArgument, match="names have to be 3"):
+            torus.to_pandas(wrong)
 
 
 def test_meshio_meshes_have_all_coordinates():

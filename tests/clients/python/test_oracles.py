@@ -121,6 +121,7 @@ def test_noise_is_smoothed_and_told():
 def test_a_linkage_knows_its_joints():
     linkage = oracles.Linkage(FOUR_BARS, GROUND)
     assert linkage.moving == ["p", "q", "r"]
+    assert linkage.coordinate_names == ("p.x", "p.y", "q.x", "q.y", "r.x", "r.y")
     assert (linkage.dimension, linkage.ambient_dimension) == (2, 6)
     at = linkage.joints(linkage.closest_point(near(linkage, 0.05)))
     for a, b, length in FOUR_BARS:

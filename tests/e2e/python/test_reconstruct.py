@@ -13,6 +13,7 @@ import pytest
 import samples
 import stellate
 import topology
+from stellate import manifolds, oracles
 from stellate._generated import stellate_pb2 as pb
 from stellate._points import CheckedPoints
 from stellate._wire.arrays import to_wire
@@ -53,6 +54,22 @@ def test_a_torus(server, torus):
     assert told.spacing == pytest.approx(0.14, rel=0.3)
     assert seen[-1].phase == "DONE" and seen[-1].vertices == len(torus)
     assert "reconstructed from points" in str(mesh.report)
+
+
+def test_names_of_coordinates_stay(server, torus):
+    pandas = pytest.importorskip("pandas")
+    names = ["strain", "kelvin", "stress"]
+    table = pandas.DataFrame(torus, columns=names)
+    assert list(stellate.reconstruct(table, 2, server=server).to_pandas()) == names
+    assert list(oracles.PointCloud(table, 2).coordinate_names) == names
+    sphere = manifolds.Sphere(2)
+    sphere.coordinate_names = names
+    for options in ({}, {"scale": 2.0}, {"keep": "box"}):
+        mesh = stellate.mesh(sphere, 0.6, server=server, **options)
+        assert list(mesh.to_pandas()) == names
+    sphere.coordinate_names = names[:2]
+    with pytest.raises(stellate.InvalidArgument, match="coordinate_names have to be 3"):
+        stellate.mesh(sphere, 0.6, server=server)
 
 
 def test_a_klein_bottle_in_four_dimensions(server, rng):

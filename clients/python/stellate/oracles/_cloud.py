@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .._point_sets import as_points, tree_of
+from .._point_sets import as_points, column_names, tree_of
 from .._rows import Array, Flags, apply, norms, product, transposed
 from ..errors import InvalidArgument
 from ._bandwidth import Fits, by_density, insist_on_flatness, noise_aware
@@ -44,7 +44,7 @@ class PointCloud(Projection):
     thread_safe = True
 
     def __init__(self, points: Any, dimension: int, *, bandwidth: float | None = None) -> None:
-        self._points = as_points(points, "points")
+        self._points, self.coordinate_names = as_points(points, "points"), column_names(points)
         n, d = self._points.shape
         if not isinstance(dimension, int) or not 1 <= dimension < d:
             raise InvalidArgument(

@@ -53,6 +53,9 @@ class Linkage(ImplicitManifold):
                 "leave nothing to move"
             )
         self._space, self._places = space, places
+        self.coordinate_names = tuple(
+            f"{joint}.{axis}" for joint in self.moving for axis in "xyz"[:space]
+        )
         self._bars = [(a, b, float(length)) for a, b, length in bars]
         lower, upper = self._box()
         super().__init__(
