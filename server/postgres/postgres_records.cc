@@ -1,114 +1,27 @@
 #include "server/postgres/postgres_records.h"
 
 #include <algorithm>
-#include <thread>
 #include <utility>
 
 #include "core/base/message.h"
 #include "server/base/log.h"
+#include "server/postgres/statements.h"
 
 namespace stellate::server {
 namespace {
 
 using core::Message;
-using Outcome = Connection::Outcome;
 
 // Sent at once. What a transaction has beyond that goes in several statements, the last record in
 // the last: a round is there once its own record is, and that is put after its answers.
 constexpr std::size_t kSentBytes = std::size_t{16} << 20;
-constexpr std::int64_t kRemovedRecords = 16;            // at once: of a megabyte at most each
-constexpr auto kRest = std::chrono::milliseconds(100);  // before the database is asked again
-
-// The mesh's row is locked, so that a takeover waits for what is being written, and a write that
-// came after it finds no row and does nothing. $1: the mesh; $2: its epoch, as this server has it.
-#define STELLATE_MINE \
-  "WITH mine AS (SELECT id FROM stellate.meshes WHERE id = $1 AND epoch = $2 FOR NO KEY UPDATE), "
-
-// Of several meshes. $1, $2: them and their epochs; $3: what their records will have in bytes;
-// $4: whether they end by this; $5, $6: their names and owners, where they are begun.
-constexpr char kPut[] =
-    "WITH mine AS (SELECT m.id, e.bytes, e.ended, e.name, e.owner FROM stellate.meshes AS m, "
-    "unnest($1, $2, $3, $4, $5, $6) AS e (id, epoch, bytes, ended, name, owner) "
-    "WHERE m.id = e.id AND m.epoch = e.epoch FOR NO KEY UPDATE OF m), "
-    "put AS (INSERT INTO stellate.records AS r (mesh, kind, number, part, seal, bytes) "
-    "SELECT p.mesh, p.kind, p.number, p.part, p.seal, p.bytes FROM mine, "
-    "unnest($7, $8, $9, $10, $11, $12) AS p (mesh, kind, number, part, seal, bytes) "
-    "WHERE p.mesh = mine.id "
-    "ON CONFLICT (mesh, kind, number, part) DO UPDATE SET seal = excluded.seal, "
-    "bytes = excluded.bytes WHERE r.seal <> excluded.seal), "
-    "note AS (UPDATE stellate.meshes AS m SET bytes = mine.bytes, "
-    "ended = m.ended OR mine.ended > 0, name = coalesce(nullif(mine.name, ''), m.name), "
-    "owner = CASE WHEN mine.name = '' THEN m.owner ELSE mine.owner END "
-    "FROM mine WHERE m.id = mine.id) "
-    "SELECT id FROM mine";
-constexpr char kRemove[] = STELLATE_MINE
-    "gone AS (DELETE FROM stellate.records AS r USING mine WHERE r.mesh = mine.id AND kind = $3 "
-    "AND number = $4 AND part = $5) "
-    "SELECT id FROM mine";
-// The last rounds first: what is left has no gap. A mesh's mark is the last to go.
-constexpr char kRemoveSome[] = STELLATE_MINE
-    "gone AS (DELETE FROM stellate.records AS r USING mine, "
-    "(SELECT mesh, kind, number, part FROM stellate.records WHERE mesh = $1 AND kind BETWEEN $3 "
-    "AND $4 ORDER BY number DESC, kind DESC, part DESC LIMIT $5) AS s "
-    "WHERE (r.mesh, r.kind, r.number, r.part) = (s.mesh, s.kind, s.number, s.part)) "
-    "SELECT id FROM mine";
-// The name is free, and nobody finds the mesh any more.
-constexpr char kUnname[] =
-    "UPDATE stellate.meshes SET name = NULL, ended = true WHERE id = $1 AND epoch = $2 "
-    "RETURNING id";
-constexpr char kForget[] = "DELETE FROM stellate.meshes WHERE id = $1 AND epoch = $2 RETURNING id";
-constexpr char kBegin[] = "SELECT stellate.begin_mesh($1, $2, $3, $4, $5)";
-constexpr char kNewMesh[] = "SELECT nextval('stellate.mesh_ids')";
-
-// A share of the meshes whose servers are gone, or that of the name $2. What is locked is being
-// written, or taken up, by another. Not by a server that is gone itself.
-constexpr char kAdopt[] =
-    "WITH orphan AS (SELECT m.id FROM stellate.meshes AS m, stellate.servers AS me "
-    "WHERE me.id = $1 AND ($2 = '' OR m.name = $2) AND "
-    "NOT EXISTS (SELECT FROM stellate.servers AS s WHERE s.id = m.server) "
-    "ORDER BY m.id LIMIT (SELECT greatest(2, (SELECT count(*) FROM stellate.meshes AS o WHERE "
-    "NOT EXISTS (SELECT FROM stellate.servers AS s WHERE s.id = o.server)) "
-    "/ (SELECT count(*) FROM stellate.servers) + 1)) FOR UPDATE OF m SKIP LOCKED) "
-    "UPDATE stellate.meshes AS m SET server = $1, epoch = m.epoch + 1 FROM orphan "
-    "WHERE m.id = orphan.id RETURNING m.id";
-// What this server has, and does not know of: also where it did not hear that it had taken it up.
-constexpr char kUnknown[] =
-    "SELECT id, epoch FROM stellate.meshes WHERE server = $1 AND NOT id = ANY ($2)";
-// This server was away, and has another row: the meshes that nobody took up meanwhile are its own,
-// as they are.
-constexpr char kRenew[] =
-    "WITH me AS (INSERT INTO stellate.servers (address, beats) VALUES ($1, 0) RETURNING id), "
-    "back AS (UPDATE stellate.meshes AS m SET server = me.id FROM me, "
-    "unnest($2, $3) AS e (id, epoch) WHERE m.id = e.id AND m.epoch = e.epoch RETURNING m.id) "
-    "SELECT me.id, back.id FROM me LEFT JOIN back ON true";
-constexpr char kName[] =
-    "UPDATE stellate.meshes SET name = $2, owner = $3, ended = $4 > 0, bytes = $5 "
-    "WHERE id = $1 AND name IS NULL AND NOT EXISTS (SELECT FROM stellate.meshes WHERE name = $2) "
-    "RETURNING id";
-constexpr char kLocate[] =
-    "SELECT m.server, s.id IS NULL, coalesce(s.address, '') FROM stellate.meshes AS m "
-    "LEFT JOIN stellate.servers AS s ON s.id = m.server WHERE m.name = $1";
-constexpr char kElsewhere[] =
-    "SELECT owner, sum(bytes)::int8 FROM stellate.meshes WHERE server <> $1 GROUP BY owner";
-constexpr char kMeasure[] =
-    "SELECT coalesce(sum(octet_length(bytes)), 0)::int8, "
-    "count(*) FILTER (WHERE kind BETWEEN $2 AND $3) FROM stellate.records WHERE mesh = $1";
-constexpr char kRead[] =
-    "SELECT seal, bytes FROM stellate.records WHERE mesh = $1 AND kind = $2 AND number = $3 AND "
-    "part = $4";
-constexpr char kList[] =
-    "SELECT kind::int8, number, part::int8 FROM stellate.records WHERE mesh = $1 "
-    "ORDER BY kind, number, part";
-// Answers and histories are large: of them it is enough to know that there are some.
-constexpr char kLoad[] =
-    "SELECT mesh, kind::int8, number, part::int8, seal, bytes FROM stellate.records "
-    "WHERE mesh = ANY ($3) AND kind NOT IN ($1, $2) ORDER BY mesh, kind, number, part";
-constexpr char kLoadSizes[] =
-    "SELECT mesh, kind::int8, sum(octet_length(bytes))::int8 FROM stellate.records "
-    "WHERE mesh = ANY ($1) GROUP BY mesh, kind";
-#undef STELLATE_MINE
+constexpr std::int64_t kRemovedRecords = 16;  // at once: of a megabyte at most each
 
 std::int64_t Number(RecordKind kind) { return static_cast<std::int64_t>(kind); }
+
+Records::Trouble AnothersMesh() {
+  return {false, "another server has the mesh", Records::Trouble::Refusal::kNone};
+}
 
 }  // namespace
 
@@ -127,6 +40,13 @@ core::Expected<std::unique_ptr<PostgresRecords>> PostgresRecords::Open(
                                 first.troubles.front()));
   }
   return records;
+}
+
+bool PostgresRecords::Run(const char* sql, const Parameters& parameters, Rows* rows) {
+  if (database_.Run(sql, parameters, rows)) return true;
+  const auto& [full, message] = database_.trouble();
+  trouble_ = {full, message, Trouble::Refusal::kNone};
+  return false;
 }
 
 std::int64_t PostgresRecords::EpochOf(std::int64_t mesh) const {
@@ -160,7 +80,7 @@ bool PostgresRecords::Renew() {
   Rows rows;
   const std::string address = lease_->address();
   const auto parameters = Parameters().Add(std::string_view(address)).Add(meshes).Add(epochs);
-  if (!Run(kRenew, parameters, &rows)) return false;
+  if (!Run(statements::kRenew, parameters, &rows)) return false;
   std::set<std::int64_t> kept;
   for (int row = 0; row < rows.count(); ++row) kept.insert(rows.Number(row, 1));
   std::size_t lost = 0;
@@ -178,10 +98,11 @@ bool PostgresRecords::Renew() {
 bool PostgresRecords::Tend(const std::string& name, Tidings* tidings) {
   if (lease_->IsLost() && !Renew()) return false;
   Rows rows;
-  if (!Run(kAdopt, Parameters().Add(lease_->number()).AddBytes(name), &rows)) return false;
+  if (!Run(statements::kAdopt, Parameters().Add(lease_->number()).AddBytes(name), &rows))
+    return false;
   std::vector<std::int64_t> held, epochs, fresh;
   ListHeld(&held, &epochs);
-  if (!Run(kUnknown, Parameters().Add(lease_->number()).Add(held), &rows)) return false;
+  if (!Run(statements::kUnknown, Parameters().Add(lease_->number()).Add(held), &rows)) return false;
   {
     const std::lock_guard lock(mutex_);
     for (int row = 0; row < rows.count(); ++row) {
@@ -194,7 +115,7 @@ bool PostgresRecords::Tend(const std::string& name, Tidings* tidings) {
     return false;
   }
   if (!name.empty()) return true;
-  if (!Run(kElsewhere, Parameters().Add(lease_->number()), &rows)) return false;
+  if (!Run(statements::kElsewhere, Parameters().Add(lease_->number()), &rows)) return false;
   bytes_.elsewhere = 0;
   for (int row = 0; row < rows.count(); ++row) {
     const auto bytes = static_cast<std::uint64_t>(rows.Number(row, 1));
@@ -208,7 +129,7 @@ bool PostgresRecords::Tend(const std::string& name, Tidings* tidings) {
 bool PostgresRecords::Load(const std::vector<std::int64_t>& ids, Tidings* tidings) {
   Rows rows;
   const auto answers = Number(RecordKind::kAnswers), history = Number(RecordKind::kHistoryPart);
-  if (!Run(kLoad, Parameters().Add(answers).Add(history).Add(ids), &rows)) return false;
+  if (!Run(statements::kLoad, Parameters().Add(answers).Add(history).Add(ids), &rows)) return false;
   std::map<std::int64_t, StoredMesh> meshes;
   for (const std::int64_t id : ids) meshes[id];
   std::set<std::int64_t> damaged;
@@ -227,7 +148,7 @@ bool PostgresRecords::Load(const std::vector<std::int64_t>& ids, Tidings* tiding
         "DELETE FROM stellate.meshes WHERE id = ",
         place.mesh, " and DELETE FROM stellate.records WHERE mesh = ", place.mesh));
   }
-  if (!Run(kLoadSizes, Parameters().Add(ids), &rows)) return false;
+  if (!Run(statements::kLoadSizes, Parameters().Add(ids), &rows)) return false;
   for (int row = 0; row < rows.count(); ++row) {
     const Place place{rows.Number(row, 0), static_cast<RecordKind>(rows.Number(row, 1)), 0, 0};
     const auto size = static_cast<std::uint64_t>(rows.Number(row, 2));
@@ -258,7 +179,7 @@ bool PostgresRecords::Name(std::int64_t mesh, const StoredMesh& stored) {
   std::chrono::system_clock::time_point unused;
   if (!DecodeStart(stored.start, &request, &unused)) return true;
   Rows rows;
-  return Run(kName,
+  return Run(statements::kName,
              Parameters()
                  .Add(mesh)
                  .AddBytes(request.name)
@@ -270,69 +191,11 @@ bool PostgresRecords::Name(std::int64_t mesh, const StoredMesh& stored) {
 
 bool PostgresRecords::Locate(const std::string& name, Whereabouts* found) {
   Rows rows;
-  if (!Run(kLocate, Parameters().AddBytes(name), &rows)) return false;
+  if (!Run(statements::kLocate, Parameters().AddBytes(name), &rows)) return false;
   *found = {};
   if (rows.count() == 0) return true;
   *found = {true, rows.Number(0, 0), rows.Flag(0, 1), std::string(rows.Bytes(0, 2))};
   return true;
-}
-
-bool PostgresRecords::Fail(bool full, std::string message) {
-  trouble_ = {full, std::move(message), Trouble::Refusal::kNone};
-  return false;
-}
-
-void PostgresRecords::Rest() const {
-  const TimePoint until = Clock::now() + kRest;
-  while (!stopping_ && Clock::now() < until) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(10));
-  }
-}
-
-void PostgresRecords::NoteAbsence(bool away) {
-  if (away == away_since_.has_value()) return;
-  if (away) {
-    away_since_ = Clock::now();
-    Log(LogLevel::kError, {},
-        Message("the database does not answer, and meshes wait for it: ", trouble_.message));
-  } else {
-    const std::chrono::duration<double> waited = Clock::now() - *away_since_;
-    away_since_.reset();
-    Log(LogLevel::kInfo, {}, "the database is back", LogFields().Add("seconds", waited.count()));
-  }
-}
-
-Outcome PostgresRecords::TryRun(const char* sql, const Parameters& parameters, Rows* rows) {
-  if (connection_ == nullptr) {
-    auto opened = Connection::Open(url_);
-    if (!opened) {
-      Fail(false, opened.error().message);
-      return Outcome::kAway;
-    }
-    connection_ = std::move(*opened);
-  }
-  const Outcome outcome = connection_->Run(sql, parameters, rows, stopping_);
-  if (outcome != Outcome::kDone) Fail(outcome == Outcome::kFull, connection_->error());
-  if (outcome == Outcome::kAway) connection_.reset();
-  return outcome;
-}
-
-// Waits where the database is away, unless the server stops: then it tries once.
-bool PostgresRecords::Run(const char* sql, const Parameters& parameters, Rows* rows) {
-  while (true) {
-    const Outcome outcome = TryRun(sql, parameters, rows);
-    NoteAbsence(outcome == Outcome::kAway);
-    if (outcome == Outcome::kDone) return true;
-    if (outcome != Outcome::kAway) return false;
-    if (stopping_) return Fail(false, Message("the server stops: ", trouble_.message));
-    const auto waited = Clock::now() - *away_since_;
-    if (waited >= options_.patience) {
-      const std::chrono::duration<double> seconds = waited;
-      return Fail(false, Message("the database has not answered for ", seconds.count(),
-                                 " seconds (--database-patience): ", trouble_.message));
-    }
-    Rest();
-  }
 }
 
 // Of one mesh.
@@ -341,12 +204,13 @@ bool PostgresRecords::Write(const char* sql, std::int64_t mesh, const Parameters
   if (!Run(sql, parameters, &rows)) return false;
   if (rows.count() == 1) return true;
   Lose(mesh);
-  return Fail(false, "another server has the mesh");
+  trouble_ = AnothersMesh();
+  return false;
 }
 
 std::int64_t PostgresRecords::NewMesh() {
   Rows rows;
-  return Run(kNewMesh, {}, &rows) && rows.count() == 1 ? rows.Number(0, 0) : 0;
+  return Run(statements::kNewMesh, {}, &rows) && rows.count() == 1 ? rows.Number(0, 0) : 0;
 }
 
 bool PostgresRecords::Transact(const std::function<bool()>& action) {
@@ -388,7 +252,7 @@ bool PostgresRecords::Begin() {
     const MeshRequest request = RequestIn(put_.starts[mesh]);
     const auto limit = static_cast<std::int64_t>(owner_meshes_.load());
     Rows rows;
-    if (!Run(kBegin,
+    if (!Run(statements::kBegin,
              Parameters()
                  .Add(mesh)
                  .AddBytes(request.name)
@@ -420,9 +284,12 @@ bool PostgresRecords::Begin() {
 bool PostgresRecords::SendPut() {
   if (put_.mesh.empty()) return true;
   const std::uint64_t all = bytes_.total + bytes_.elsewhere;
-  if (options_.max_bytes > 0 && all + put_.size > options_.max_bytes) {
-    return Fail(true, Message("its records have ", all, " bytes of the ", options_.max_bytes,
-                              " of --max-journal-bytes"));
+  if (max_bytes_ > 0 && all + put_.size > max_bytes_) {
+    trouble_ = {
+        true,
+        Message("its records have ", all, " bytes of the ", max_bytes_, " of --max-journal-bytes"),
+        Trouble::Refusal::kNone};
+    return false;
   }
   if (!Begin()) return false;
   std::map<std::int64_t, std::uint64_t> bytes;  // by mesh
@@ -442,7 +309,7 @@ bool PostgresRecords::SendPut() {
   parameters.Add(meshes).Add(epochs).Add(sums).Add(ended).AddBytes(names).AddBytes(owners);
   parameters.Add(put_.mesh).Add(put_.kind).Add(put_.number).Add(put_.part).Add(put_.seal);
   Rows rows;
-  if (!Run(kPut, parameters.AddBytes(put_.bytes), &rows)) return false;
+  if (!Run(statements::kPut, parameters.AddBytes(put_.bytes), &rows)) return false;
   std::set<std::int64_t> mine;
   for (int row = 0; row < rows.count(); ++row) mine.insert(rows.Number(row, 0));
   for (const std::int64_t mesh : meshes) {
@@ -454,14 +321,16 @@ bool PostgresRecords::SendPut() {
     }
   }
   put_ = {};
-  return mine.size() == meshes.size() || Fail(false, "another server has the mesh");
+  if (mine.size() == meshes.size()) return true;
+  trouble_ = AnothersMesh();
+  return false;
 }
 
 // Asks anew, so that what was repeated counts once.
 bool PostgresRecords::Measure(std::int64_t mesh, KindRange kinds, std::int64_t* records) {
   Rows rows;
   const auto parameters = Parameters().Add(mesh).Add(Number(kinds.first)).Add(Number(kinds.last));
-  if (!Run(kMeasure, parameters, &rows)) return false;
+  if (!Run(statements::kMeasure, parameters, &rows)) return false;
   const auto bytes = static_cast<std::uint64_t>(rows.Number(0, 0));
   bytes_.total += bytes - std::exchange(bytes_.of[mesh], bytes);
   if (bytes == 0) bytes_.of.erase(mesh);
@@ -471,7 +340,7 @@ bool PostgresRecords::Measure(std::int64_t mesh, KindRange kinds, std::int64_t* 
 
 bool PostgresRecords::Remove(const Place& place) {
   std::int64_t left = 0;
-  return Write(kRemove, place.mesh,
+  return Write(statements::kRemove, place.mesh,
                Parameters()
                    .Add(place.mesh)
                    .Add(EpochOf(place.mesh))
@@ -484,7 +353,7 @@ bool PostgresRecords::Remove(const Place& place) {
 // Its row, the last of a mesh.
 bool PostgresRecords::Forget(std::int64_t mesh) {
   Rows rows;
-  if (!Run(kForget, Parameters().Add(mesh).Add(EpochOf(mesh)), &rows)) return false;
+  if (!Run(statements::kForget, Parameters().Add(mesh).Add(EpochOf(mesh)), &rows)) return false;
   Lose(mesh);
   return true;
 }
@@ -496,7 +365,8 @@ bool PostgresRecords::RemoveSome(std::int64_t mesh, Kinds kinds, bool* done) {
   if (!Measure(mesh, range, &left)) return false;
   *done = left == 0;
   if (*done) return !all || Forget(mesh);
-  if (all && !Write(kUnname, mesh, Parameters().Add(mesh).Add(EpochOf(mesh)))) return false;
+  if (all && !Write(statements::kUnname, mesh, Parameters().Add(mesh).Add(EpochOf(mesh))))
+    return false;
   if (all && left > kRemovedRecords && !Transact([&] {
         return Put({mesh, RecordKind::kRemoved, -1, 0}, "");
       })) {
@@ -508,7 +378,8 @@ bool PostgresRecords::RemoveSome(std::int64_t mesh, Kinds kinds, bool* done) {
                               .Add(Number(range.first))
                               .Add(Number(range.last))
                               .Add(kRemovedRecords);
-  if (!Write(kRemoveSome, mesh, parameters) || !Measure(mesh, range, &left)) return false;
+  if (!Write(statements::kRemoveSome, mesh, parameters) || !Measure(mesh, range, &left))
+    return false;
   *done = left == 0;
   return !*done || !all || Forget(mesh);
 }
@@ -517,7 +388,7 @@ Records::Found PostgresRecords::Read(const Place& place, std::string* record) {
   Rows rows;
   const Parameters parameters =
       Parameters().Add(place.mesh).Add(Number(place.kind)).Add(place.number).Add(place.part);
-  if (!Run(kRead, parameters, &rows)) return Found::kDamaged;
+  if (!Run(statements::kRead, parameters, &rows)) return Found::kDamaged;
   if (rows.count() == 0) return Found::kNo;
   *record = rows.Bytes(0, 1);
   const auto seal = static_cast<std::uint64_t>(rows.Number(0, 0));
@@ -526,7 +397,7 @@ Records::Found PostgresRecords::Read(const Place& place, std::string* record) {
 
 bool PostgresRecords::ListPlaces(std::int64_t mesh, std::vector<Place>* places) {
   Rows rows;
-  if (!Run(kList, Parameters().Add(mesh), &rows)) return false;
+  if (!Run(statements::kList, Parameters().Add(mesh), &rows)) return false;
   places->clear();
   for (int row = 0; row < rows.count(); ++row) {
     places->push_back({mesh, static_cast<RecordKind>(rows.Number(row, 0)), rows.Number(row, 1),

@@ -6,14 +6,13 @@
 #include <map>
 #include <memory>
 #include <mutex>
-#include <optional>
 #include <set>
 #include <string>
 #include <string_view>
 #include <vector>
 
 #include "server/base/clock.h"
-#include "server/postgres/connection.h"
+#include "server/postgres/patient_connection.h"
 #include "server/postgres/server_lease.h"
 #include "server/storage/records.h"
 
@@ -48,7 +47,7 @@ class PostgresRecords final : public Records, public Sharing {
   bool ListPlaces(std::int64_t mesh, std::vector<Place>* places) override;
   std::uint64_t BytesOf(std::int64_t mesh) const override;
   Trouble trouble() const override { return trouble_; }
-  void StopWaiting() override { stopping_ = true; }
+  void StopWaiting() override { database_.StopWaiting(); }
   std::int64_t EpochOf(std::int64_t mesh) const override;
   bool AreAway() const override { return !lease_->IsAnswered(); }
   Sharing* sharing() override { return this; }
@@ -64,9 +63,10 @@ class PostgresRecords final : public Records, public Sharing {
 
  private:
   PostgresRecords(std::string url, std::unique_ptr<ServerLease> lease, const Options& options)
-      : url_(std::move(url)), options_(options), lease_(std::move(lease)) {}
+      : max_bytes_(options.max_bytes),
+        lease_(std::move(lease)),
+        database_(std::move(url), options.patience) {}
   bool Run(const char* sql, const Parameters& parameters, Rows* rows);
-  Connection::Outcome TryRun(const char* sql, const Parameters& parameters, Rows* rows);
   bool Write(const char* sql, std::int64_t mesh, const Parameters& parameters);
   bool Begin();
   bool SendPut();
@@ -76,18 +76,12 @@ class PostgresRecords final : public Records, public Sharing {
   bool Renew();
   bool Load(const std::vector<std::int64_t>& ids, Tidings* tidings);
   bool Name(std::int64_t mesh, const StoredMesh& stored);
-  void NoteAbsence(bool away);
-  bool Fail(bool full, std::string message);
-  void Rest() const;
   void ListHeld(std::vector<std::int64_t>* meshes, std::vector<std::int64_t>* epochs) const;
 
-  const std::string url_;
-  const Options options_;
+  const std::uint64_t max_bytes_;
   const std::unique_ptr<ServerLease> lease_;
-  std::unique_ptr<Connection> connection_;  // null: broken
-  std::atomic<bool> stopping_{false};
+  PatientConnection database_;
   std::atomic<std::uint64_t> owner_meshes_{0};
-  std::optional<TimePoint> away_since_;
   Trouble trouble_;
   Tidings first_;  // of the meshes that were there
 
