@@ -115,7 +115,8 @@ class Server::Impl {
     Sharing* const sharing = state.journal->sharing();
     if (sharing == nullptr) return;
     sharing->LimitOwners(asked.owner_meshes);
-    state.authenticator->Trust({sharing->secret(), [sharing] { return sharing->number(); }});
+    state.authenticator->Trust({sharing->secret(), [sharing] { return sharing->number(); },
+                                [sharing] { return sharing->beat(); }});
     state.router.Start(PeerCredentials(asked));
   }
 

@@ -15,6 +15,7 @@ namespace {
 
 constexpr char kHeader[] = "authorization";
 constexpr std::string_view kScheme = "Bearer ";
+constexpr std::int64_t kTicketBeats = 60;  // for which a ticket is good: about a minute
 
 tl::unexpected<grpc::Status> Unauthenticated(const std::string& message) {
   return tl::unexpected(Refusal(v1::ERROR_REASON_UNAUTHENTICATED, message));
@@ -93,9 +94,10 @@ tl::expected<Identity, grpc::Status> Authenticator::IdentifyPassedOn(
     std::string_view authorization) const {
   auto ticket = ReadTicket(authorization, peers_.secret);
   if (!ticket) return Unauthenticated("no server of this database signed the call");
-  if (ticket->server != peers_.number()) {
-    return tl::unexpected(Refusal(v1::ERROR_REASON_SHUTTING_DOWN,
-                                  "the call was meant for an earlier server: call again"));
+  if (ticket->server != peers_.number() || peers_.beat() - ticket->beat > kTicketBeats) {
+    return tl::unexpected(
+        Refusal(v1::ERROR_REASON_SHUTTING_DOWN,
+                "the call was meant for an earlier server, or passed on long ago: call again"));
   }
   return Identity{std::move(ticket->owner), std::nullopt, ticket->administrator, true,
                   std::move(ticket->address)};

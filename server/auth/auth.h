@@ -29,7 +29,8 @@ struct Identity {
 // What servers know each other's calls by.
 struct PeerTrust {
   std::string secret;
-  std::function<std::int64_t()> number;  // this server's, as calls to it name it
+  // This server's, as calls to it have them.
+  std::function<std::int64_t()> number, beat;
 };
 
 // Authenticates callers: by bearer token if there is a token file, else by the client certificate

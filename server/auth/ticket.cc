@@ -59,8 +59,8 @@ std::string_view TakeLine(std::string_view* rest) {
 
 std::string Sign(const Ticket& ticket, const std::string& secret) {
   const std::string words =
-      core::Message(std::to_string(ticket.server), "\n", ticket.administrator ? "1" : "0", "\n",
-                    ticket.address, "\n", ticket.owner);
+      core::Message(std::to_string(ticket.server), "\n", std::to_string(ticket.beat), "\n",
+                    ticket.administrator ? "1" : "0", "\n", ticket.address, "\n", ticket.owner);
   return core::Message(kTicketScheme, Hex(words), ".", Hex(DigestOf(words, secret)));
 }
 
@@ -80,9 +80,11 @@ std::optional<Ticket> ReadTicket(std::string_view authorization, const std::stri
     return std::nullopt;
   }
   std::string_view rest = *words;
-  const std::string_view server = TakeLine(&rest);
   Ticket ticket;
-  std::from_chars(server.data(), server.data() + server.size(), ticket.server);
+  for (std::int64_t* const number : {&ticket.server, &ticket.beat}) {
+    const std::string_view digits = TakeLine(&rest);
+    std::from_chars(digits.data(), digits.data() + digits.size(), *number);
+  }
   ticket.administrator = TakeLine(&rest) == "1";
   ticket.address = TakeLine(&rest);
   ticket.owner = rest;

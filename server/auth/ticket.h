@@ -8,10 +8,12 @@
 namespace stellate::server {
 
 // What a server says of a call that it passes on to another: for whom it is, in place of the
-// caller's own token. Signed with the secret that the servers share, for one server alone, so that
-// it is worth nothing elsewhere.
+// caller's own token. Signed with the secret that the servers share, for one server alone and a
+// minute of its beats, so that it is worth nothing elsewhere, and soon nothing at all. No clock is
+// compared with another machine's: both have the beats from the database.
 struct Ticket {
   std::int64_t server = 0;  // that it is meant for
+  std::int64_t beat = 0;    // of that server, as the one that passes the call on has seen it
   std::string owner;
   bool administrator = false;
   std::string address;  // where the call comes from

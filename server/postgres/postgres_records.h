@@ -53,6 +53,7 @@ class PostgresRecords final : public Records, public Sharing {
   Sharing* sharing() override { return this; }
 
   std::int64_t number() const override { return lease_->number(); }
+  std::int64_t beat() const override { return lease_->beat(); }
   std::vector<Peer> Peers() const override { return lease_->Peers(); }
   const std::string& secret() const override { return lease_->secret(); }
   void Announce(const std::string& address) override { lease_->Announce(address); }

@@ -31,7 +31,7 @@ constexpr char kCommon[] =
 constexpr char kEnter[] =
     "INSERT INTO stellate.servers (address, beats) VALUES ('', 0) RETURNING id";
 constexpr char kBeatOnce[] =
-    "UPDATE stellate.servers SET beats = beats + 1, address = $2 WHERE id = $1 RETURNING id";
+    "UPDATE stellate.servers SET beats = beats + 1, address = $2 WHERE id = $1 RETURNING beats";
 constexpr char kLookAround[] =
     "SELECT id, beats, address, EXISTS (SELECT FROM stellate.meshes AS m WHERE NOT EXISTS "
     "(SELECT FROM stellate.servers AS s WHERE s.id = m.server)) FROM stellate.servers";
@@ -185,12 +185,14 @@ void ServerLease::Announce(const std::string& address) {
 std::vector<Peer> ServerLease::Peers() const {
   std::vector<Peer> peers;
   const std::lock_guard lock(mutex_);
-  for (const auto& [number, sight] : servers_) peers.push_back({number, sight.address});
+  for (const auto& [number, sight] : servers_)
+    peers.push_back({number, sight.beats, sight.address});
   return peers;
 }
 
 void ServerLease::Renew(std::int64_t number) {
   number_ = number;
+  beat_ = 0;
   lost_ = false;
 }
 
@@ -224,7 +226,11 @@ bool ServerLease::Beat() {
   const auto parameters = Parameters().Add(number_.load()).Add(std::string_view(address()));
   if (connection_->Run(kBeatOnce, parameters, &rows, stopping_) != Outcome::kDone) return false;
   last_beat_ = Clock::now();
-  if (rows.count() == 0) lost_ = true;
+  if (rows.count() == 0) {
+    lost_ = true;
+  } else {
+    beat_ = rows.Number(0, 0);
+  }
   return true;
 }
 

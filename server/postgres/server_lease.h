@@ -43,6 +43,8 @@ class ServerLease {
   ~ServerLease();
 
   std::int64_t number() const { return number_; }
+  // How often this server has beaten, as its row says.
+  std::int64_t beat() const { return beat_; }
   const std::string& secret() const { return secret_; }
   std::string address() const;
   void Announce(const std::string& address);
@@ -72,7 +74,7 @@ class ServerLease {
 
   const std::string url_, secret_;
   std::unique_ptr<Connection> connection_;  // null: broken
-  std::atomic<std::int64_t> number_;
+  std::atomic<std::int64_t> number_, beat_{0};
   std::atomic<bool> lost_{false}, orphans_{false}, stopping_{false};
   std::atomic<bool> has_news_{false};               // for the others, with the next beat
   std::atomic<TimePoint> last_beat_{Clock::now()};  // that was taken

@@ -168,7 +168,7 @@ Route Router::Resolve(const std::string& mesh, bool is_passed_on) {
     Tend(mesh);
     return IsHere(mesh) ? Route{} : not_now;
   }
-  Peer peer{found->server, found->address};
+  Peer peer{found->server, 0, found->address};
   if (!found->exists) {
     if (is_passed_on) return {};
     for (const Peer& one : sharing_->Peers()) {
@@ -243,6 +243,13 @@ std::int64_t Router::NumberAfter(std::int64_t number) const {
   return 0;
 }
 
+std::int64_t Router::BeatOf(std::int64_t number) const {
+  for (const Peer& peer : sharing_->Peers()) {
+    if (peer.number == number) return peer.beat;
+  }
+  return 0;
+}
+
 Route Router::ResolvePage(const std::string& token, bool is_passed_on) const {
   if (sharing_ == nullptr || is_passed_on) return {};
   const std::int64_t turn = NumberAfter(ReadPageToken(token).server - 1);
@@ -255,9 +262,9 @@ Route Router::ResolvePage(const std::string& token, bool is_passed_on) const {
 
 void Router::Introduce(const Route& route, const Identity& caller, const std::string& address,
                        const grpc::ServerContextBase& call, grpc::ClientContext* passed_on) const {
-  passed_on->AddMetadata(
-      "authorization",
-      Sign({route.server, caller.owner, caller.administrator, address}, sharing_->secret()));
+  passed_on->AddMetadata("authorization", Sign({route.server, BeatOf(route.server), caller.owner,
+                                                caller.administrator, address},
+                                               sharing_->secret()));
   passed_on->set_deadline(call.deadline());
 }
 

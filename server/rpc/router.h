@@ -96,6 +96,7 @@ class Router {
   Route Resolve(const std::string& mesh, bool is_passed_on);
   Route ResolvePage(const std::string& token, bool is_passed_on) const;
   Route To(const Peer& peer) const;
+  std::int64_t BeatOf(std::int64_t number) const;  // as this server has last seen it
   bool IsHere(const std::string& mesh) const;
 
   ServerState& state_;

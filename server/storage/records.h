@@ -35,7 +35,8 @@ struct Whereabouts {
 // A server that shares the records.
 struct Peer {
   std::int64_t number = 0;
-  std::string address;  // empty: not known yet; kUnlisted
+  std::int64_t beat = 0;  // as this server has last seen it: counts about each second
+  std::string address;    // empty: not known yet; kUnlisted
 };
 // The address of one that takes no calls.
 inline constexpr char kUnlisted[] = "-";
@@ -54,6 +55,7 @@ class Sharing {
 
   // This server's number among them, another one once it was away for too long.
   virtual std::int64_t number() const = 0;
+  virtual std::int64_t beat() const = 0;        // this server's
   virtual std::vector<Peer> Peers() const = 0;  // all servers, this one too, ascending
   // Known to these servers alone.
   virtual const std::string& secret() const = 0;

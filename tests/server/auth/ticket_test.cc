@@ -6,13 +6,13 @@ namespace stellate::server {
 namespace {
 
 const std::string kSecret(32, 's');
-const Ticket kTicket{7, "ada\nlovelace", true, "ipv4:10.0.0.1:40000"};
+const Ticket kTicket{7, 1234, "ada\nlovelace", true, "ipv4:10.0.0.1:40000"};
 
 TEST(Ticket, SaysWhatWasSigned) {
   const std::string words = Sign(kTicket, kSecret);
   EXPECT_TRUE(IsTicket(words));
   EXPECT_EQ(ReadTicket(words, kSecret), kTicket);
-  const Ticket nameless{1, "", false, ""};
+  const Ticket nameless{1, 0, "", false, ""};
   EXPECT_EQ(ReadTicket(Sign(nameless, kSecret), kSecret), nameless);
 }
 
