@@ -114,6 +114,25 @@ grpc::Status MovedAway() {
                  "the mesh goes from one server to another: call again in a moment");
 }
 
+grpc::Status FromPeer(grpc::Status status) {
+  const bool is_silence =
+      status.error_code() == grpc::StatusCode::UNAVAILABLE && status.error_details().empty();
+  if (!is_silence) return status;
+  Log(LogLevel::kWarning, {}, "the server that has a mesh does not answer",
+      LogFields().Add("why", status.error_message()));
+  return Refusal(v1::ERROR_REASON_SHUTTING_DOWN,
+                 "the server that has the mesh does not answer; where it has died, another takes "
+                 "its place within seconds: call again in a moment");
+}
+
+std::optional<grpc::Status> RefuseBeyondLimit(ServerState& state, const Session& session) {
+  if (!IsBeyondLimit(session)) return std::nullopt;
+  const std::string message = session.View().failure.message;
+  state.store.Delete(session.request().name);
+  return Refuse(state,
+                {{"owner-meshes", core::Message(state.config()->owner_meshes), "owner"}, message});
+}
+
 grpc::Status ShuttingDown() {
   return Refusal(v1::ERROR_REASON_SHUTTING_DOWN, "the server is stopping: connect again later");
 }

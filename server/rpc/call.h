@@ -4,6 +4,7 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <tl/expected.hpp>
 
@@ -71,5 +72,12 @@ grpc::Status NoRequest();
 grpc::Status ShuttingDown();
 // UNAVAILABLE: the mesh is on its way to another server.
 grpc::Status MovedAway();
+// What a call that was passed on ended with, as its caller is to hear it: where the other server
+// said nothing, UNAVAILABLE with this server's words. Logs that.
+grpc::Status FromPeer(grpc::Status status);
+
+// Once the mesh of a declaration is recorded: RESOURCE_EXHAUSTED where its owner has too many on
+// all servers together, and nothing is left of it.
+std::optional<grpc::Status> RefuseBeyondLimit(ServerState& state, const Session& session);
 
 }  // namespace stellate::server

@@ -87,22 +87,12 @@ class CreateStream final : public ServerStream<v1::CreateMeshRequest, v1::Mesh> 
 
   Step Next() override {
     if (!session()->ports().recorded->HasHappened()) return Step::kWait;
-    const auto& journal = session()->ports().journal;
-    if (journal != nullptr && journal->IsBeyondLimit()) {
-      End(BeyondLimit());
+    if (auto refusal = RefuseBeyondLimit(state(), *session())) {
+      End(std::move(*refusal));
       return Step::kWait;
     }
     ToProto(*session(), response());
     return Step::kSendLast;
-  }
-
-  // Of all servers together, as the record says: nothing is left of the mesh.
-  grpc::Status BeyondLimit() {
-    const SessionView view = session()->View();
-    state().store.Delete(session()->request().name);
-    return Refuse(state(),
-                  {{"owner-meshes", core::Message(state().config()->owner_meshes), "owner"},
-                   view.failure.message});
   }
 
   bool IsStuck(TimePoint now) const override {

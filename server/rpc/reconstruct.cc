@@ -46,8 +46,8 @@ class UploadStream final : public ServerStream<v1::PointsChunk, v1::ReconstructR
   }
 
   void End(const core::Status& blame) override {
-    if (!blame.ok()) return EndWith(ToGrpc(blame));
-    Reply();
+    if (blame.ok() || IsBeyondLimit(*session())) return Reply();
+    EndWith(ToGrpc(blame));
   }
 
  private:
@@ -95,6 +95,7 @@ class UploadStream final : public ServerStream<v1::PointsChunk, v1::ReconstructR
     });
   }
   void ReplyNow() {
+    if (const auto refusal = RefuseBeyondLimit(state(), *session())) return Refuse(*refusal);
     const auto lock = Lock();
     reply_ = true;
     Pump();
@@ -152,7 +153,7 @@ class UploadStream final : public ServerStream<v1::PointsChunk, v1::ReconstructR
   }
 
   void TakePoints(const v1::Points& points) {
-    if (!IsJoined()) return Refuse(IsOver());
+    if (!IsJoined()) return IsBeyondLimit(*session()) ? Reply() : Refuse(IsOver());
     auto part = FromProto(points, *session()->request().points);
     core::Status status =
         part ? session()->intake()->Offer(this, std::move(*part)) : std::move(part.error());

@@ -119,7 +119,7 @@ class ServerStream : public grpc::ServerBidiReactor<Incoming<Request>, Response>
     has_answer_ = true;
     Pump();
   }
-  void OnOver(grpc::Status status) final { EndWith(std::move(status)); }
+  void OnOver(grpc::Status status) final { EndWith(FromPeer(std::move(status))); }
 
  protected:
   enum class Step { kWait, kSend, kSendLast };

@@ -66,7 +66,7 @@ class UnaryCall final : public grpc::ServerBidiReactor<Request, Response> {
     call_->state.router.Introduce(route_, call_->caller, call_->peer, context_, &passed_on_);
     grpc::TemplatedGenericStub<Request, Response>(route_.channel)
         .UnaryCall(&passed_on_, PathOf<Request>(), {}, &request_, &response_,
-                   [this](grpc::Status status) { Reply(std::move(status)); });
+                   [this](grpc::Status status) { Reply(FromPeer(std::move(status))); });
   }
 
   void Reply(grpc::Status status) {

@@ -140,5 +140,7 @@ class Session {
 
 // Another server goes on with the mesh: clients are to be led there, and see nothing of it here.
 bool IsElsewhere(const Session& session);
+// It has failed as its owner has as many meshes as the servers allow together.
+bool IsBeyondLimit(const Session& session);
 
 }  // namespace stellate::server

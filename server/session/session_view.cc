@@ -55,6 +55,11 @@ bool IsElsewhere(const Session& session) {
   return journal != nullptr && journal->IsElsewhere();
 }
 
+bool IsBeyondLimit(const Session& session) {
+  const auto& journal = session.ports().journal;
+  return journal != nullptr && journal->IsBeyondLimit();
+}
+
 bool Session::IsReplaying() const { return server::IsReplaying(life()); }
 
 SessionView Session::View() const {
