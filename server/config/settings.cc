@@ -102,7 +102,8 @@ const std::vector<Setting>& Settings() {
        "File of lines \"OWNER TOKEN\": clients must send one of these tokens, and see their "
        "owner's meshes alone. Read again when it changes, or after SIGHUP"},
 
-      {kServerLimits, "--max-meshes", &Config::max_meshes, "Meshes running at a time", 1, 100'000,
+      {kServerLimits, "--max-meshes", &Config::max_meshes,
+       "Meshes running at a time; of several servers on a --database each its own", 1, 100'000,
        kLive},
       {kServerLimits, "--max-memory-bytes", &Config::max_memory_bytes,
        "Estimated memory of all meshes; 0: three quarters of what the machine or container has", 0,
@@ -123,12 +124,15 @@ const std::vector<Setting>& Settings() {
        4, 1'000'000},
 
       {kOwnerLimits, "--owner-meshes", &Config::owner_meshes,
-       "Meshes running at a time; 0: as many as the server allows", 0, 100'000, kLive},
+       "Meshes running at a time, on all servers of a --database together; 0: as many as the "
+       "server "
+       "allows",
+       0, 100'000, kLive},
       {kOwnerLimits, "--keep-finished-meshes", &Config::keep_finished_meshes,
        "Finished meshes that can be read, of all clients together where they are not "
        "authenticated. "
        "What is beyond is forgotten, first what has no vertex, nothing else within a minute of its "
-       "end",
+       "end. Each server of a --database counts its own",
        0, 1'000'000, kLive},
       {kOwnerLimits, "--owner-memory-bytes", &Config::owner_memory_bytes,
        "Estimated memory of an owner's meshes; 0: half of the server's", 0, kBytes, kLive},
