@@ -109,6 +109,8 @@ class Reconnector:
         """
         if not is_transient(error):
             raise as_ours from None
+        if as_ours.reason == "SHUTTING_DOWN":  # said by a server
+            self._policy.reached = True
         hopeless = self._policy.hopeless()
         if hopeless is not None:
             raise hopeless from None

@@ -43,7 +43,8 @@ def _sources() -> list[pathlib.Path]:
 
 def _carried() -> dict[str, pathlib.Path]:
     """What is carried beside the stubs, by its path there."""
-    return {path.name: path for path in sorted(_SHARED.glob("*.toml"))}
+    carried = [*_SHARED.glob("*.toml"), _SHARED / "retries.json"]
+    return {path.name: path for path in sorted(carried)}
 
 
 def _fingerprint(sources: list[pathlib.Path]) -> str:

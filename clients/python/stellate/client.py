@@ -21,6 +21,7 @@ from ._info import MeshInfo, ServerInfo
 from ._points import CheckedPoints
 from ._reconnect import WAITS, Reconnector, ReconnectPolicy
 from ._saved import SavedMesh
+from ._shared import text
 from ._streams import Parts, Watch
 from ._upload import Upload
 from ._wire.spec import mesh_spec
@@ -91,6 +92,7 @@ class Client:
             # The pauses between attempts are ours; gRPC's own would be up to two minutes.
             ("grpc.initial_reconnect_backoff_ms", int(1000 * WAITS["first_connection_pause"])),
             ("grpc.max_reconnect_backoff_ms", int(1000 * WAITS["longest_connection_pause"])),
+            ("grpc.service_config", text("retries.json")),  # a reply that was lost on the way
         ]
         if address.startswith(("unix:", "localhost:", "127.", "[::1]:")):
             options.append(("grpc.enable_http_proxy", 0))  # proxies are for the outside
