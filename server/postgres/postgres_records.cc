@@ -100,18 +100,21 @@ bool PostgresRecords::Tend(const std::string& name, Tidings* tidings) {
   Rows rows;
   if (!Run(statements::kAdopt, Parameters().Add(lease_->number()).AddBytes(name), &rows))
     return false;
-  std::vector<std::int64_t> held, epochs, fresh;
+  std::vector<std::int64_t> held, epochs;
+  Fresh fresh;
   ListHeld(&held, &epochs);
   if (!Run(statements::kUnknown, Parameters().Add(lease_->number()).Add(held), &rows)) return false;
   {
     const std::lock_guard lock(mutex_);
     for (int row = 0; row < rows.count(); ++row) {
-      fresh.push_back(rows.Number(row, 0));
-      epochs_[fresh.back()] = rows.Number(row, 1);
+      const std::int64_t mesh = rows.Number(row, 0);
+      fresh.meshes.push_back(mesh);
+      epochs_[mesh] = rows.Number(row, 1);
+      if (rows.Flag(row, 2)) (rows.Flag(row, 3) ? fresh.deleted : fresh.nameless).insert(mesh);
     }
   }
-  if (!fresh.empty() && !Load(fresh, tidings)) {
-    for (const std::int64_t mesh : fresh) Lose(mesh);  // the next Tend finds them again
+  if (!fresh.meshes.empty() && !Load(fresh, tidings)) {
+    for (const std::int64_t mesh : fresh.meshes) Lose(mesh);  // the next Tend finds them again
     return false;
   }
   if (!name.empty()) return true;
@@ -126,7 +129,8 @@ bool PostgresRecords::Tend(const std::string& name, Tidings* tidings) {
 }
 
 // What there is of each. One that is damaged is left as it is.
-bool PostgresRecords::Load(const std::vector<std::int64_t>& ids, Tidings* tidings) {
+bool PostgresRecords::Load(const Fresh& fresh, Tidings* tidings) {
+  const auto& ids = fresh.meshes;
   Rows rows;
   const auto answers = Number(RecordKind::kAnswers), history = Number(RecordKind::kHistoryPart);
   if (!Run(statements::kLoad, Parameters().Add(answers).Add(history).Add(ids), &rows)) return false;
@@ -160,9 +164,10 @@ bool PostgresRecords::Load(const std::vector<std::int64_t>& ids, Tidings* tiding
   }
   for (auto& [id, mesh] : meshes) {
     if (damaged.contains(id)) continue;
+    mesh.removed = mesh.removed || fresh.deleted.contains(id);
     if (mesh.start.empty() && !mesh.removed) {  // nobody has heard of it
       if (!Forget(id)) return false;
-    } else if (!Name(id, mesh)) {
+    } else if (fresh.nameless.contains(id) && !Name(id, mesh)) {
       return false;
     } else {
       tidings->meshes.emplace(id, std::move(mesh));
@@ -174,7 +179,7 @@ bool PostgresRecords::Load(const std::vector<std::int64_t>& ids, Tidings* tiding
 // Of a mesh that a server recorded which had the database for itself: its row lacks what others
 // find it by.
 bool PostgresRecords::Name(std::int64_t mesh, const StoredMesh& stored) {
-  if (EpochOf(mesh) != 1 || stored.removed) return true;
+  if (stored.removed) return true;
   MeshRequest request;
   std::chrono::system_clock::time_point unused;
   if (!DecodeStart(stored.start, &request, &unused)) return true;

@@ -75,7 +75,13 @@ class PostgresRecords final : public Records, public Sharing {
   bool Forget(std::int64_t mesh);
   void Lose(std::int64_t mesh);
   bool Renew();
-  bool Load(const std::vector<std::int64_t>& ids, Tidings* tidings);
+  // Meshes that this server has, and does not know yet.
+  struct Fresh {
+    std::vector<std::int64_t> meshes;
+    std::set<std::int64_t> nameless;
+    std::set<std::int64_t> deleted;  // by a server that was gone before all was removed
+  };
+  bool Load(const Fresh& fresh, Tidings* tidings);
   bool Name(std::int64_t mesh, const StoredMesh& stored);
   void ListHeld(std::vector<std::int64_t>* meshes, std::vector<std::int64_t>* epochs) const;
 

@@ -1,7 +1,7 @@
 #pragma once
 
-// The statements of PostgresRecords, over the tables of schema.cc. Those that write do nothing for a
-// mesh of another epoch, and may be repeated.
+// The statements of PostgresRecords, over the tables of schema.cc. Those that write do nothing for
+// a mesh of another epoch, and may be repeated.
 namespace stellate::server::statements {
 
 // The mesh's row is locked, so that a takeover waits for what is being written, and a write that
@@ -37,11 +37,12 @@ inline constexpr char kRemoveSome[] = STELLATE_MINE
     "AND $4 ORDER BY number DESC, kind DESC, part DESC LIMIT $5) AS s "
     "WHERE (r.mesh, r.kind, r.number, r.part) = (s.mesh, s.kind, s.number, s.part)) "
     "SELECT id FROM mine";
-// The name is free, and nobody finds the mesh any more.
+// The name is free, and no call finds the mesh any more.
 inline constexpr char kUnname[] =
     "UPDATE stellate.meshes SET name = NULL, ended = true WHERE id = $1 AND epoch = $2 "
     "RETURNING id";
-inline constexpr char kForget[] = "DELETE FROM stellate.meshes WHERE id = $1 AND epoch = $2 RETURNING id";
+inline constexpr char kForget[] =
+    "DELETE FROM stellate.meshes WHERE id = $1 AND epoch = $2 RETURNING id";
 inline constexpr char kBegin[] = "SELECT stellate.begin_mesh($1, $2, $3, $4, $5)";
 inline constexpr char kNewMesh[] = "SELECT nextval('stellate.mesh_ids')";
 
@@ -58,9 +59,10 @@ inline constexpr char kAdopt[] =
     "WHERE m.id = orphan.id RETURNING m.id";
 // What this server has, and does not know of: also where it did not hear that it had taken it up.
 inline constexpr char kUnknown[] =
-    "SELECT id, epoch FROM stellate.meshes WHERE server = $1 AND NOT id = ANY ($2)";
-// This server was away, and has another row: the meshes that nobody took up meanwhile are its own,
-// as they are.
+    "SELECT id, epoch, name IS NULL, ended FROM stellate.meshes "
+    "WHERE server = $1 AND NOT id = ANY ($2)";
+// This server was away, and has another row: the meshes that no other took up meanwhile are its
+// own, as they are.
 inline constexpr char kRenew[] =
     "WITH me AS (INSERT INTO stellate.servers (address, beats) VALUES ($1, 0) RETURNING id), "
     "back AS (UPDATE stellate.meshes AS m SET server = me.id FROM me, "
