@@ -23,6 +23,7 @@ from typing import Any
 import kubernetes_objects
 import manifest_safety
 import manifests
+import monitor
 import yaml
 from kubernetes_objects import ROOT
 
@@ -146,6 +147,34 @@ class Kubernetes(unittest.TestCase):
             objects = kubernetes_objects.load()
             del objects[gone]
             self.assertNotEqual(manifests.problems(objects), [], gone)
+
+
+class Monitor(unittest.TestCase):
+    def test_nothing_is_wrong(self) -> None:
+        self.assertEqual(monitor.problems(monitor.load(), kubernetes_objects.load()), [])
+
+    def test_every_mistake_is_seen(self) -> None:
+        mistakes: list[tuple[str, Any, str]] = [
+            ("apiVersion", "monitoring.coreos.com/v2", "no ServiceMonitor"),
+            ("kind", "PodMonitor", "no ServiceMonitor"),
+            ("metadata.namespace", "default", "lets in ['monitoring'] alone"),
+            ("spec.namespaceSelector.matchNames", ["default"], "chooses the Services []"),
+            ("spec.selector.matchLabels", {"app": "stellated"}, "chooses the Services []"),
+            ("spec.selector", {}, "chooses the Services ["),
+            ("spec.endpoints", _GONE, "reads the port None"),
+            ("spec.endpoints.0.port", "grpc", "reads the port grpc"),
+            ("spec.endpoints.0.port", 9717, "reads the port 9717"),
+            ("spec.endpoints.0.path", "/", "no metrics at /"),
+            ("spec.endpoints.0.interval", 15, "no interval"),
+            ("spec.endpoints.0.intervall", "15s", "no such field: intervall"),
+            ("spec.endpionts", [], "no such field: endpionts"),
+        ]
+        for path, value, word in mistakes:
+            with self.subTest(path=path, value=value):
+                changed = monitor.load()
+                put(changed, path, value)
+                found = monitor.problems(changed, kubernetes_objects.load())
+                self.assertIn(word, "\n".join(found))
 
 
 class ServerOfTheManifest(unittest.TestCase):
