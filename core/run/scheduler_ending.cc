@@ -85,7 +85,7 @@ void Scheduler<K>::DescribeEnding() {
   }
   if (interruption_.raised()) return;  // the mesh was never reported
   watches_.box.Warn(&certificate);
-  if (termination == Termination::kNoProgress)
+  if (termination == Termination::kNoProgress && !creases_.crease())
     ExplainInactiveWall<K>(engine_, spec_.walls, &certificate);
   // The one that explains the most leads in the end.
   ExplainSharpest<K>(engine_, termination == Termination::kNoProgress, &certificate);

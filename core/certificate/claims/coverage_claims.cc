@@ -3,6 +3,7 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cstdint>
+#include <string>
 #include <utility>
 
 #include "core/base/dense.h"
@@ -23,6 +24,18 @@ constexpr double kErrorsInNormal = 100;
 // sine) for the two to be relied on. In codimension 1 the normal alone tells all, and only where M
 // ends or has a crease is it far off.
 constexpr double kMostOff = 0.03, kMostOffAlone = 0.3;
+
+// Returns why a mesh may miss the point x of M, to be appended. Empty for a point in the box.
+std::string WhyMissed(const Specification& spec, const Eigen::VectorXd& x, double size) {
+  if (!spec.bounding_box) return {};
+  const auto& [lower, upper] = *spec.bounding_box;
+  const double beyond = (x - x.cwiseMax(lower).cwiseMin(upper)).norm();
+  if (beyond <= size) return {};
+  return Message("; that point lies ", Brief(beyond),
+                 " outside of the bounding box, in which components are looked for: give a box "
+                 "that holds all of the manifold, or keep the components that seeds lie on (in "
+                 "Python keep=\"seeds\")");
+}
 
 }  // namespace
 
@@ -50,7 +63,8 @@ void CoverageClaims::JudgeProbes(const Eigen::MatrixXd& asked, const AnswerBlock
           Findings::kCoverage,
           Message("the mesh misses a part of the manifold: its point ", NamePoint(probe.x), " is ",
                   Brief(probe.nearest.distance), " away from the nearest vertex, ",
-                  probe.nearest.vertex, ", where the mesh size is ", Brief(x_.size)));
+                  probe.nearest.vertex, ", where the mesh size is ", Brief(x_.size),
+                  WhyMissed(x_.spec, probe.x, x_.size)));
       continue;
     }
     if (answer.tangents.size() > 0) {
@@ -239,10 +253,10 @@ Evidence CoverageClaims::JudgeSeen() {
     x_.wanted.insert(x_.wanted.end(), y, y + x_.mesh.d);
   }
   const Eigen::VectorXd first = Eigen::Map<const Eigen::VectorXd>(x_.wanted.data(), x_.mesh.d);
-  x_.findings.Refuse(
-      Findings::kCoverage,
-      Message("the mesh misses a part of the manifold: the oracle answered with ", NamePoint(first),
-              ", and no vertex is near; answers like it: ", evidence.uncovered.size()));
+  x_.findings.Refuse(Findings::kCoverage,
+                     Message("the mesh misses a part of the manifold: the oracle answered with ",
+                             NamePoint(first), ", and no vertex is near; answers like it: ",
+                             evidence.uncovered.size(), WhyMissed(x_.spec, first, x_.size)));
   return evidence;
 }
 

@@ -255,6 +255,7 @@ TEST(Certifier, RefusesAMissingComponent) {
   const Certificate by_box = Certify(spec, mesh, closest).certificate;
   EXPECT_FALSE(by_box.certified);
   EXPECT_TRUE(Says(by_box.verdict, "misses a part")) << by_box.verdict;
+  EXPECT_FALSE(Says(by_box.verdict, "outside of the bounding box")) << by_box.verdict;
 
   // What the run began with is not asked again: its answers are known.
   KnownOfManifold known;
@@ -264,6 +265,14 @@ TEST(Certifier, RefusesAMissingComponent) {
       Certify(spec, mesh, closest, {0, 0, true}, nullptr, known).certificate;
   EXPECT_FALSE(by_seed.certified);
   EXPECT_TRUE(Says(by_seed.verdict, "misses a part")) << by_seed.verdict;
+
+  spec.bounding_box = BoundingBox{Eigen::Vector3d::Constant(-2), Eigen::Vector3d::Constant(2)};
+  const Certificate outside =
+      Certify(spec, mesh, closest, {0, 0, true}, nullptr, known).certificate;
+  EXPECT_TRUE(Says(outside.verdict,
+                   "answers like it: 1; that point lies 4 outside of the "
+                   "bounding box"))
+      << outside.verdict;
 }
 
 TEST(Certifier, RefusesAMissingSheetNearby) {
