@@ -69,6 +69,22 @@ ${declarations}
 ")
 endfunction()
 
+# Writes a C++ header with the text of a file of clients/shared as a constant of that name.
+function(stellate_shared_text header file namespace name)
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS ${file})
+  file(READ ${file} text)
+  get_filename_component(source ${file} NAME)
+  file(CONFIGURE OUTPUT ${header} @ONLY CONTENT "// From clients/shared/${source}.
+#pragma once
+
+namespace ${namespace} {
+
+inline constexpr char ${name}[] = R\"text(${text})text\";
+
+}  // namespace ${namespace}
+")
+endfunction()
+
 # max_meshes -> kMaxMeshes
 function(stellate_constant_name result key)
   string(REPLACE "_" ";" words ${key})

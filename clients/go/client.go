@@ -59,6 +59,7 @@ func NewClient(to Connection) (*Client, error) {
 		// So that the next chunk comes while one is answered.
 		grpc.WithInitialWindowSize(streamWindow), grpc.WithInitialConnWindowSize(2*streamWindow),
 		grpc.WithDefaultCallOptions(grpc.MaxCallRecvMsgSize(largestMessage), grpc.MaxCallSendMsgSize(largestMessage)),
+		grpc.WithDefaultServiceConfig(shared.Retries), // a reply that was lost on the way
 		grpc.WithConnectParams(grpc.ConnectParams{Backoff: pauses, MinConnectTimeout: 5 * time.Second}))
 	if !private { // whose end shows at once
 		options = append(options, grpc.WithKeepaliveParams(keepalive.ClientParameters{Time: pingTime, Timeout: pingWait}))

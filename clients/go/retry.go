@@ -73,6 +73,9 @@ func (o *outage) wait(ctx context.Context, err error, ours *Error) error {
 	if hopeless := o.hopeless(); hopeless != nil {
 		return hopeless
 	}
+	if ours.Reason == "SHUTTING_DOWN" { // said by a server
+		o.reached.Store(true)
+	}
 	if !o.reached.Load() {
 		return ours
 	}

@@ -336,7 +336,7 @@ TEST_F(BrokenDownload, GoesOnWhereItWas) {
   ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
   using Asked = std::vector<std::pair<std::uint64_t, std::uint64_t>>;
   EXPECT_EQ(fake_.asked, (Asked{{0, 0}, {7, 4}, {7, 4}, {7, 9}}));
-  EXPECT_EQ(outages_, 3);
+  EXPECT_EQ(outages_, 2);  // gRPC itself repeats the call that brought nothing
   ASSERT_EQ(mesh->points.cols(), 6);
   for (int i = 0; i < 6; ++i) EXPECT_EQ(mesh->points.col(i), Eigen::Vector2d(i, 0.5));
   SimplexMatrix cells(2, 6);

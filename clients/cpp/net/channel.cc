@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "shared/reconnect.h"
+#include "shared/retries.h"
 
 namespace stellate::client {
 namespace {
@@ -120,6 +121,7 @@ Expected<std::shared_ptr<grpc::Channel>> Connect(const Connection& connection) {
                    Milliseconds(reconnect::kFirstConnectionPause));
   arguments.SetInt(GRPC_ARG_MAX_RECONNECT_BACKOFF_MS,
                    Milliseconds(reconnect::kLongestConnectionPause));
+  arguments.SetServiceConfigJSON(reconnect::kRetries);  // a reply that was lost on the way
   return grpc::experimental::CreateCustomChannelWithInterceptors(
       connection.server, *security, arguments, std::move(interceptors));
 }

@@ -13,7 +13,7 @@ import type { PointsChunk } from "./generated/stellate/v1/PointsChunk.js";
 import type { ReconstructReply__Output } from "./generated/stellate/v1/ReconstructReply.js";
 import type { WatchMeshResponse__Output } from "./generated/stellate/v1/WatchMeshResponse.js";
 import type { ListMeshesResponse__Output } from "./generated/stellate/v1/ListMeshesResponse.js";
-import { RECONNECT } from "./generated/shared.js";
+import { RECONNECT, RETRIES } from "./generated/shared.js";
 import { CheckedOracle, type Oracle } from "./oracle.js";
 import { infoFrom, type MeshInfo } from "./report.js";
 import { Outage, type Patience } from "./retry.js";
@@ -69,6 +69,7 @@ export class Client {
       // The pauses between attempts are ours; gRPC's own would be up to two minutes.
       "grpc.initial_reconnect_backoff_ms": 1000 * RECONNECT.first_connection_pause,
       "grpc.max_reconnect_backoff_ms": 1000 * RECONNECT.longest_connection_pause,
+      "grpc.service_config": RETRIES, // a reply that was lost on the way
       // Proxies are for the outside.
       ...(staysOnThisMachine(this.address) ? { "grpc.enable_http_proxy": 0 } : {}),
       interceptors: credentials.token === undefined ? [] : [tokenInterceptor(credentials.token)],

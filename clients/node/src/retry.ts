@@ -76,6 +76,7 @@ export class Outage {
     if (!isTransient(error)) throw ours;
     const hopeless = this.patience.hopeless();
     if (hopeless) throw hopeless;
+    if (ours.reason === "SHUTTING_DOWN") this.patience.reached = true; // said by a server
     if (this.stopped || !this.patience.reached) throw ours;
     const now = Date.now();
     if (!this.attempts) {

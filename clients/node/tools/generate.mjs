@@ -37,4 +37,8 @@ const shared = ["auto", "reconnect", "checkpoint"].map((name) => {
   const values = rows.map((row) => `  ${row[1]}: ${row[2]},\n`).join("");
   return `/** Of clients/shared/${name}.toml. */\nexport const ${name.toUpperCase()} = {\n${values}};\n`;
 });
+const retries = JSON.stringify(JSON.parse(readFileSync(at("../../shared/retries.json"), "utf8")));
+shared.push(
+  `/** clients/shared/retries.json, a service config of gRPC. */\nexport const RETRIES = ${JSON.stringify(retries)};\n`,
+);
 writeFileSync(at("../src/generated/shared.ts"), shared.join("\n"));

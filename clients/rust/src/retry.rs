@@ -106,6 +106,9 @@ impl<'a> Outage<'a> {
         if ours.kind == Kind::Other {
             ours.kind = Kind::Unavailable;
         }
+        if &*ours.reason == "SHUTTING_DOWN" {
+            self.patience.reached.store(true, Ordering::Relaxed); // said by a server
+        }
         if self.stopped.is_set() || !self.patience.reached.load(Ordering::Relaxed) {
             return Err(ours);
         }

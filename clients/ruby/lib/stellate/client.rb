@@ -175,6 +175,7 @@ module Stellate
         # The pauses between attempts are ours; gRPC's own would be up to two minutes.
         'grpc.initial_reconnect_backoff_ms' => (1000 * RECONNECT[:first_connection_pause]).to_i,
         'grpc.max_reconnect_backoff_ms' => (1000 * RECONNECT[:longest_connection_pause]).to_i,
+        'grpc.service_config' => RETRIES, # a reply that was lost on the way
         # Proxies are for the outside.
         'grpc.enable_http_proxy' => Credentials.stays_on_this_machine?(address) ? 0 : 1 }
     end

@@ -44,6 +44,8 @@ module Stellate
 
       hopeless = @patience.hopeless.call
       raise hopeless if hopeless
+
+      @patience.reached = true if ours.reason == 'SHUTTING_DOWN' # said by a server
       raise ours if stopped? || !@patience.reached
 
       begin_waiting(ours) unless lasts?

@@ -99,6 +99,7 @@ final class Outage {
     if (hopeless != null) {
       throw hopeless;
     }
+    patience.reached |= "SHUTTING_DOWN".equals(ours.reason()); // said by a server
     if (isStopped() || !patience.reached) {
       throw ours;
     }
