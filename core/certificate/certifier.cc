@@ -261,7 +261,10 @@ Certifier::Certifier(const Specification& spec, const MeshView& mesh, const Star
 }
 Certifier::~Certifier() = default;
 
-const std::vector<QueryBlock>* Certifier::NextBlocks() { return rounds_->NextBlocks(); }
+std::vector<QueryBlock> Certifier::Questions() {
+  const std::vector<QueryBlock>* blocks = rounds_->NextBlocks();
+  return blocks ? *blocks : std::vector<QueryBlock>();
+}
 void Certifier::Absorb(const std::vector<AnswerBlock>& answers) { rounds_->Absorb(answers); }
 const Certificate& Certifier::certificate() const { return rounds_->certificate(); }
 const std::vector<double>& Certifier::Uncovered() const { return rounds_->wanted(); }

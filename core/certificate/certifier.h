@@ -3,31 +3,28 @@
 #include <memory>
 #include <vector>
 
-#include "core/batch.h"
 #include "core/certificate/certifier_rounds.h"
 #include "core/certificate/mesh_view.h"
+#include "core/query_source.h"
 #include "core/report.h"
 #include "core/specification.h"
 
 namespace stellate::core {
 
-// Proves or refutes that a finished mesh meets its specification. A state machine like Mesher: it
-// gives closest-point queries in a few batches, then holds the certificate.
+// Proves or refutes that a finished mesh meets its specification. It queries
+// closest points in a few batches, then holds the certificate.
 //
 //   Certifier certifier(spec, mesh, facts);
-//   while (const std::vector<QueryBlock>* blocks = certifier.NextBlocks())
-//     certifier.Absorb(Answer(*blocks));
+//   // ... drive it as a QuerySource, then:
 //   if (certifier.certificate().certified) ...
-class Certifier {
+class Certifier final : public QuerySource {
  public:
   Certifier(const Specification& spec, const MeshView& mesh, const StarFacts& facts,
             KnownOfManifold known = {});
-  ~Certifier();
+  ~Certifier() override;
 
-  // Returns the next closest-point queries, or nullptr once the certificate is complete.
-  const std::vector<QueryBlock>* NextBlocks();
-  // Takes the answers to these queries. REQUIRES: they have passed CheckAnswers.
-  void Absorb(const std::vector<AnswerBlock>& answers);
+  std::vector<QueryBlock> Questions() override;
+  void Absorb(const std::vector<AnswerBlock>& answers) override;
   const Certificate& certificate() const;
   // Returns the points of M, d each, that have no vertex of the mesh near, or none near enough for
   // max_deviation. If there are any, the mesh is refused, but may become right when they are

@@ -91,11 +91,6 @@ Certification::Certification(const Specification& spec, MeshView mesh,
       boundary_(std::move(boundary)),
       certifier_(spec, WithSimplices(mesh, simplices_, boundary_), facts, std::move(known)) {}
 
-std::vector<QueryBlock> Certification::Questions() {
-  const std::vector<QueryBlock>* blocks = certifier_.NextBlocks();
-  return blocks ? *blocks : std::vector<QueryBlock>();
-}
-
 // Adds to the faces of one wall what the simplices that end there would tell.
 template <int K>
 void AddWhatIsKnown(const Stars<K>& stars, std::vector<FaceMesh>* faces) {

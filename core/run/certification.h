@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "core/certificate/certifier.h"
+#include "core/query_source.h"
 #include "core/refinement/engine.h"
-#include "core/run/query_source.h"
 
 namespace stellate::core {
 
@@ -43,7 +43,7 @@ class Certification final : public QuerySource {
                 const StarFacts& facts, KnownOfManifold known,
                 std::optional<BoundaryOfMesh> boundary = std::nullopt);
 
-  std::vector<QueryBlock> Questions() override;
+  std::vector<QueryBlock> Questions() override { return certifier_.Questions(); }
   void Absorb(const std::vector<AnswerBlock>& answers) override { certifier_.Absorb(answers); }
 
   // Once there are no more questions; see Certifier.

@@ -134,7 +134,7 @@ std::vector<QueryBlock> CreaseProbe::Questions() {
   if (unconfirmed_) {
     block.points = unconfirmed_->point;
   } else if (is_difference_) {
-    block = *finder_.Next();
+    block = std::move(finder_.Questions().front());
   } else if (looks_beyond_) {
     block.want.tangents = gives_tangents_;
     block.points = StepsFrom(walks_.front().way);
@@ -152,8 +152,8 @@ std::vector<QueryBlock> CreaseProbe::Questions() {
 void CreaseProbe::Absorb(const std::vector<AnswerBlock>& answers) {
   if (unconfirmed_) return TakeCorner(answers.front());
   if (!is_difference_) return TakePoints(answers.front());
-  finder_.Absorb(answers.front());
-  if (finder_.Next() == nullptr) TakeTangents();
+  finder_.Absorb(answers);
+  if (finder_.is_done()) TakeTangents();
 }
 
 void CreaseProbe::TakePoints(const AnswerBlock& answer) {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/boundary/boundary_policy.h"
-#include "core/run/query_source.h"
+#include "core/query_source.h"
 #include "core/run/tangent_finder.h"
 
 namespace stellate::core {

@@ -244,11 +244,9 @@ std::vector<QueryBlock> RoundTrip<K>::Questions() {
 template <int K>
 void RoundTrip<K>::Absorb(const std::vector<AnswerBlock>& answers) {
   if (finds_tangents_) {
-    finder_.Absorb(answers.front());
-    if (const QueryBlock* more = finder_.Next())
-      open_.push_back(*more);
-    else
-      TakeTangents();
+    finder_.Absorb(answers);
+    open_ = finder_.Questions();
+    if (open_.empty()) TakeTangents();
     return;
   }
   Sort(answers);
@@ -399,12 +397,9 @@ void RoundTrip<K>::AskForTangents() {
   of.asked = asked_(Eigen::all, known);
   of.may_leave_out = planned.bends.size() > 0;
   finder_.Start(std::move(of));
-  if (const QueryBlock* block = finder_.Next()) {
-    finds_tangents_ = true;
-    open_.push_back(*block);
-  } else {
-    TakeTangents();
-  }
+  open_ = finder_.Questions();
+  finds_tangents_ = !open_.empty();
+  if (!finds_tangents_) TakeTangents();
 }
 
 template <int K>

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "core/base/instantiate.h"
+#include "core/query_source.h"
 #include "core/refinement/engine.h"
-#include "core/run/query_source.h"
 #include "core/run/tangent_finder.h"
 
 namespace stellate::core {

@@ -30,34 +30,34 @@ Scheduler<K>::Scheduler(const Specification& spec, const Interruption& interrupt
     : spec_(spec),
       interruption_(interruption),
       engine_(spec_, Resolve(spec_)),
-      tangent_finder_(K, spec_.ambient_dimension, kTangentStep * engine_.criteria().epsilon,
-                      spec_.random_seed, kTangentError * spec_.declared_reach.value_or(INFINITY)),
+      source_(spec_.oracle,
+              {K, spec_.ambient_dimension, kTangentStep * engine_.criteria().epsilon,
+               spec_.random_seed, kTangentError * spec_.declared_reach.value_or(INFINITY)}),
       creases_(spec_),
-      progress_meter_(spec_),
-      repeat_check_(spec_.epsilon),
-      wall_check_(K, spec_.ambient_dimension, spec_.epsilon),
       spare_points_(spec_.ambient_dimension),
-      watches_{{spec_.bounding_box, engine_.criteria().epsilon},
-               StallWatch(K),
-               {engine_.boundary().policy(), engine_.criteria()},
-               {}} {
+      checks_{RepeatCheck(spec_.epsilon), {K, spec_.ambient_dimension, spec_.epsilon}, {}},
+      noticed_{.box = {spec_.bounding_box, engine_.criteria().epsilon},
+               .stall = StallWatch(K),
+               .boundary = {engine_.boundary().policy(), engine_.criteria()}},
+      counts_{.meter = ProgressMeter(spec_)} {
   AskForSeeds(SeedsOf(spec_));
 }
 
 template <int K>
 std::vector<QueryBlock> Scheduler<K>::Questions() {
-  while (!outcome_) {
+  while (!end_.outcome) {
     std::vector<QueryBlock> blocks;
-    if (!end_) blocks = source().Questions();
-    const bool probes = creases_.is_asking() && (end_ || (trip_ && !blocks.empty()));
+    if (!end_.pending) blocks = source_.Questions();
+    const bool probes =
+        creases_.is_asking() && (end_.pending || (source_.trip() && !blocks.empty()));
     if (probes) creases_.Ask(&blocks);
     if (!blocks.empty()) {
-      if (repeat_check_.has_questions()) blocks.push_back(repeat_check_.Questions());
+      if (checks_.repeat.has_questions()) blocks.push_back(checks_.repeat.Questions());
       return blocks;
     }
-    if (end_)
-      Finish(*end_);
-    else if (trip_)
+    if (end_.pending)
+      Finish(*end_.pending);
+    else if (source_.trip())
       AfterTrip();
     else
       AfterCertificate();
@@ -67,31 +67,24 @@ std::vector<QueryBlock> Scheduler<K>::Questions() {
 
 template <int K>
 void Scheduler<K>::Absorb(const std::vector<AnswerBlock>& answers) {
-  ++rounds_;
-  repeat_check_.Forget();
-  if (!end_) source().Absorb(answers);
+  ++counts_.answered;
+  checks_.repeat.Forget();
+  if (!end_.pending) source_.Absorb(answers);
   creases_.Absorb(answers);
-  if (creases_.crease()) Finish(end_.value_or(Termination::kNoProgress));
+  if (creases_.crease()) Finish(end_.pending.value_or(Termination::kNoProgress));
 }
 
 template <int K>
 void Scheduler<K>::CountQueries(std::uint64_t count) {
-  ++counts_.rounds;
-  (trip_ && trip_->asks_for_tangents() ? counts_.tangent_queries : counts_.queries) += count;
+  Counts& counts = counts_.counts;
+  ++counts.rounds;
+  (asks_for_tangents() ? counts.tangent_queries : counts.queries) += count;
 }
 
 template <int K>
 void Scheduler<K>::Measure(Progress* progress) {
-  progress_meter_.Measure<K>(engine_, certification_ != nullptr,
-                             sampling_.sampler ? sampling_.sampler->CountMissing() : 0, progress);
-}
-
-template <int K>
-void Scheduler<K>::Ask(CandidateSet<K> candidates, Purpose purpose, const Engine<K>& asking) {
-  certification_.reset();
-  trip_ =
-      std::make_unique<RoundTrip<K>>(asking, spec_.oracle, tangent_finder_, std::move(candidates));
-  purpose_ = purpose;
+  counts_.meter.Measure<K>(engine_, source_.certification() != nullptr, sample_.CountMissing(),
+                           progress);
 }
 
 template <int K>
@@ -103,19 +96,19 @@ void Scheduler<K>::AskFor(Eigen::MatrixXd&& points, Purpose purpose) {
 
 template <int K>
 void Scheduler<K>::AfterTrip() {
-  const auto* const answered = trip_.get();
-  if (Status status = watches_.table.Judge(trip_->answers(), K); !status.ok())
+  const auto* const answered = source_.trip();
+  if (Status status = checks_.table.Judge(source_.trip()->answers(), K); !status.ok())
     return Fail(std::move(status));
-  spare_points_.KeepClearances(trip_->answers(), ClearPointsKept(engine_.stars().size()));
+  spare_points_.KeepClearances(source_.trip()->answers(), ClearPointsKept(engine_.stars().size()));
   TakeTrip();
-  if (outcome_ || trip_.get() != answered || AskForSample()) return;  // it has more queries
+  if (end_.outcome || source_.trip() != answered || AskForSample()) return;  // it has more queries
   change_ = engine_.Commit();
   Plan();
 }
 
 template <int K>
 void Scheduler<K>::TakeTrip() {
-  switch (purpose_) {
+  switch (source_.purpose()) {
     case Purpose::kSeeds:
       return InsertSeeds();
     case Purpose::kFaceSeeds:
@@ -135,29 +128,31 @@ void Scheduler<K>::TakeTrip() {
 
 template <int K>
 void Scheduler<K>::InsertCandidates() {
-  const Inserted inserted = engine_.Insert(trip_->candidates(), trip_->answers());
+  const Inserted inserted = engine_.Insert(source_.trip()->candidates(), source_.trip()->answers());
   const auto count = [&](Rule rule) {
     return static_cast<std::uint64_t>(
         std::count(inserted.rules.begin(), inserted.rules.end(), rule));
   };
-  counts_.inserted_size += count(Rule::kSize);
-  counts_.inserted_radius_edge += count(Rule::kRadiusEdge);
-  counts_.inserted_sliver += count(Rule::kShape);
-  counts_.inserted_inconsistent += count(Rule::kInconsistent);
-  counts_.inserted_protection += count(Rule::kProtection);
-  counts_.duplicates += inserted.duplicates;
+  Counts& counts = counts_.counts;
+  counts.inserted_size += count(Rule::kSize);
+  counts.inserted_radius_edge += count(Rule::kRadiusEdge);
+  counts.inserted_sliver += count(Rule::kShape);
+  counts.inserted_inconsistent += count(Rule::kInconsistent);
+  counts.inserted_protection += count(Rule::kProtection);
+  counts.duplicates += inserted.duplicates;
   if (inserted.front_moved) {
-    watches_.stall.NoteFrontMoved();
+    noticed_.stall.NoteFrontMoved();
     creases_.NoteFrontMoved();
   }
-  watches_.boundary.Look(trip_->candidates(), trip_->asked(), trip_->answers());
-  noted_.speculation_failed = inserted.rules.empty();
-  spare_points_.Keep(trip_->answers(), inserted.used);
+  noticed_.boundary.Look(source_.trip()->candidates(), source_.trip()->asked(),
+                         source_.trip()->answers());
+  noticed_.speculation_failed = inserted.rules.empty();
+  spare_points_.Keep(source_.trip()->answers(), inserted.used);
 }
 
 template <int K>
 void Scheduler<K>::InsertSpares() {
-  const AnsweredPoints& answers = trip_->answers();
+  const AnsweredPoints& answers = source_.trip()->answers();
   std::vector<std::uint8_t> used(answers.found.size(), 0);
   for (std::size_t i = 0; i < used.size(); ++i) {
     if (!answers.found[i]) continue;
@@ -173,10 +168,10 @@ void Scheduler<K>::InsertSpares() {
 // Decides what to do next and queries for it, or ends the refinement.
 template <int K>
 void Scheduler<K>::Plan() {
-  const std::unique_ptr<Sampler<K>> finished = std::move(sampling_.finished);
-  watches_.box.Look(engine_.stars().sample().points().data(), engine_.stars().size());
+  const std::unique_ptr<Sampler<K>> finished = sample_.TakeFinished();
+  noticed_.box.Look(engine_.stars().sample().points().data(), engine_.stars().size());
   if (engine_.is_full()) return Finish(Termination::kVertexBudget);
-  if (watches_.box.has_left()) return Finish(Termination::kNoProgress);
+  if (noticed_.box.has_left()) return Finish(Termination::kNoProgress);
   auto targets = engine_.Plan();
   if (!targets) return LeaveFaces();
   if (!PlanFaces(&targets)) return;
@@ -185,10 +180,10 @@ void Scheduler<K>::Plan() {
     return engine_.AllRulesHold() ? Certify() : End(Termination::kNoProgress);
   const ViolationIndex<K>& violations = engine_.violations();
   const bool is_lost =
-      watches_.stall.ShouldLookForLostCauses() && HasPieceTooSmall<K>(engine_, spec_.epsilon);
+      noticed_.stall.ShouldLookForLostCauses() && HasPieceTooSmall<K>(engine_, spec_.epsilon);
   if (is_lost ||
-      watches_.stall.IsHopeless(violations.size_and_shape().size(), engine_.stars().size()) ||
-      watches_.stall.HasStalled(violations.size_and_shape().size() + violations.violating(),
+      noticed_.stall.IsHopeless(violations.size_and_shape().size(), engine_.stars().size()) ||
+      noticed_.stall.HasStalled(violations.size_and_shape().size() + violations.violating(),
                                 !violations.are_all_dirty()))
     return LeaveFaces();
   creases_.Watch(engine_);
@@ -196,14 +191,15 @@ void Scheduler<K>::Plan() {
   PlannedPoints planned;
   if (boundary.has_discoveries())
     planned = FaceSeeds<K>(engine_.parts()).TakeDiscoveries();
-  else if (engine_.criteria().speculative && !noted_.speculation_failed && boundary.stage() == K) {
+  else if (engine_.criteria().speculative && !noticed_.speculation_failed &&
+           boundary.stage() == K) {
     // The few violations of R1 and R2 that are left are not worth testing R3 and R4 on all stars.
-    const bool is_rest = sampling_.is_done && !finished && violations.are_all_dirty();
-    planned = RunSpeculatively<K>(engine_, rounds_, &*targets,
+    const bool is_rest = sample_.is_done() && !finished && violations.are_all_dirty();
+    planned = RunSpeculatively<K>(engine_, counts_.answered, &*targets,
                                   is_rest ? SpeculativeRules::kSizes : SpeculativeRules::kAllRules,
                                   finished ? finished->guess() : nullptr);
   }
-  CandidateSet<K> candidates = engine_.Draw(std::move(*targets), rounds_);
+  CandidateSet<K> candidates = engine_.Draw(std::move(*targets), counts_.answered);
   candidates.planned = std::move(planned);
   Ask(std::move(candidates), Purpose::kCandidates);
 }
@@ -214,33 +210,33 @@ void Scheduler<K>::Certify() {
       AskForSpares(spare_points_.Uncovered(engine_.stars())))
     return;
   const Stars<K>& stars = engine_.stars();
-  if (stars.size() == 0 && !noted_.inside.empty())  // the discoveries led nowhere
-    return Fail({StatusCode::kNoSeeds, noted_.inside});
+  if (stars.size() == 0 && !noticed_.inside.empty())  // the discoveries led nowhere
+    return Fail({StatusCode::kNoSeeds, noticed_.inside});
   if (!engine_.filled().resolved().empty())
     engine_.filled().HandOut(stars, &change_.added, &change_.removed);
   StarFacts facts = FactsOf<K>(engine_);
-  facts.covers_box = noted_.covers_box;
-  if (!spec_.oracle.tangent_basis) facts.tangent_error_length = tangent_finder_.error_length();
+  facts.covers_box = noticed_.covers_box;
+  if (!spec_.oracle.tangent_basis) facts.tangent_error_length = source_.finder().error_length();
   MeshView mesh;
   mesh.k = K;
   mesh.d = stars.sample().d();
   mesh.vertices = stars.size();
   mesh.points = stars.sample().points().data();
   mesh.tangents = stars.sample().Tangent(0);
-  trip_.reset();
+  source_.Close();
   creases_.Stop();
   KnownOfManifold known = spare_points_.Take();
-  known.tangential_offsets = watches_.boundary.offsets();
-  certification_ = std::make_unique<Certification>(spec_, mesh, engine_.Simplices(), facts,
-                                                   std::move(known), BoundaryOf<K>(engine_));
+  known.tangential_offsets = noticed_.boundary.offsets();
+  source_.Certify(std::make_unique<Certification>(spec_, mesh, engine_.Simplices(), facts,
+                                                  std::move(known), BoundaryOf<K>(engine_)));
 }
 
 template <int K>
 void Scheduler<K>::AfterCertificate() {
   if (engine_.filled().is_handed_out() ||
-      certification_->certificate().epsilon_over_reach > kCoarse ||
-      !(AskForSparesOnWalls(certification_->UncoveredOnWalls()) ||
-        AskForSpares(certification_->Uncovered())))
+      source_.certification()->certificate().epsilon_over_reach > kCoarse ||
+      !(AskForSparesOnWalls(source_.certification()->UncoveredOnWalls()) ||
+        AskForSpares(source_.certification()->Uncovered())))
     End(Termination::kConverged);
 }
 
@@ -250,7 +246,7 @@ bool Scheduler<K>::AskForSpares(const std::vector<double>& points) {
   Eigen::MatrixXd chosen =
       spare_points_.Choose(points, engine_.stars(), engine_.criteria().epsilon);
   if (chosen.cols() == 0) return false;
-  if (certification_) spare_points_.GiveBack(certification_->TakeKnown());
+  if (source_.certification()) spare_points_.GiveBack(source_.certification()->TakeKnown());
   AskFor(std::move(chosen), Purpose::kSpares);
   return true;
 }

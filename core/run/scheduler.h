@@ -1,6 +1,6 @@
 #pragma once
 
-#include <memory>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <utility>
@@ -8,21 +8,19 @@
 
 #include "core/base/instantiate.h"
 #include "core/base/interruption.h"
+#include "core/query_source.h"
 #include "core/refinement/engine.h"
 #include "core/run/boundary_detector.h"
-#include "core/run/certification.h"
 #include "core/run/crease_search.h"
+#include "core/run/current_source.h"
 #include "core/run/ending.h"
+#include "core/run/initial_sample.h"
 #include "core/run/progress_meter.h"
-#include "core/run/query_source.h"
 #include "core/run/repeat_check.h"
-#include "core/run/round_trip.h"
 #include "core/run/spare_points.h"
 #include "core/run/table_check.h"
-#include "core/run/tangent_finder.h"
 #include "core/run/wall_check.h"
 #include "core/run/watches.h"
-#include "core/sampling/sampler.h"
 
 namespace stellate::core {
 
@@ -31,6 +29,36 @@ struct Outcome {
   Termination termination = Termination::kConverged;
   Status failure;  // of the oracle
   Certificate certificate;
+};
+
+struct RunEnd {
+  std::optional<Termination> pending{};  // how the run ends once the crease search is done
+  std::optional<Outcome> outcome{};
+};
+
+// What answers have to agree with, in addition to CheckAnswers.
+struct AnswerChecks {
+  RepeatCheck repeat;
+  WallCheck walls;
+  TableCheck table;
+};
+
+// What a run has noticed so far.
+struct Noticed {
+  BoxWatch box;
+  StallWatch stall;
+  BoundaryDetector boundary;
+  bool speculation_failed = false;     // the last round of candidates inserted nothing
+  bool covers_box = false;             // each seed of a covered box has its closest point
+  std::optional<PieceOfWall> piece{};  // that the mesh lacked at some time
+  std::string inside{};                // why no seed's point is in M with boundary, if so
+};
+
+// What a run has done so far, and an estimate of what is left.
+struct RunCounts {
+  std::uint64_t answered = 0;  // rounds, each with all its parts
+  Counts counts{};             // without those of the mesh itself
+  ProgressMeter meter;
 };
 
 // Decides what a run asks next, around its engine: the seeds, each round's candidates and, once no
@@ -47,38 +75,33 @@ class Scheduler final : public QuerySource {
 
   // Whether `answers`, to the open queries, agree with those to the same queries in an earlier
   // round. If not, they must not be absorbed.
-  Status Judge(const Answers& answers) const { return repeat_check_.Judge(answers); }
+  Status Judge(const Answers& answers) const { return checks_.repeat.Judge(answers); }
 
   std::vector<QueryBlock> Questions() override;
   void Absorb(const std::vector<AnswerBlock>& answers) override;
-  bool asks_for_tangents() const override { return trip_ && trip_->asks_for_tangents(); }
+  bool asks_for_tangents() const override { return source_.asks_for_tangents(); }
 
   // End the run now.
   void Finish(Termination termination, Status failure = Status::Ok());
   void Fail(Status reason);
   // Takes back an end that an interruption left half done.
-  void Reopen() { outcome_.reset(); }
+  void Reopen() { end_.outcome.reset(); }
   // Nothing until the run is over.
-  const std::optional<Outcome>& outcome() const { return outcome_; }
+  const std::optional<Outcome>& outcome() const { return end_.outcome; }
 
   const Engine<K>& engine() const { return engine_; }
   // Returns the simplices that were added and removed since the last call.
   typename Engine<K>::Change TakeChange() { return std::exchange(change_, {}); }
   // Counts a round, or a part of one, of so many queries.
   void CountQueries(std::uint64_t count);
-  const Counts& counts() const { return counts_; }  // without those of the mesh itself
+  const Counts& counts() const { return counts_.counts; }  // without those of the mesh itself
   // As ProgressMeter::Measure.
   void Measure(Progress* progress);
 
  private:
-  // What a round trip's answers are for.
-  enum class Purpose { kSeeds, kFaceSeeds, kWallCheck, kSample, kCandidates, kSpares, kCrowds };
-
-  QuerySource& source() { return trip_ ? static_cast<QuerySource&>(*trip_) : *certification_; }
   void Ask(CandidateSet<K> candidates, Purpose purpose) {
-    Ask(std::move(candidates), purpose, engine_);
+    source_.Ask(engine_, std::move(candidates), purpose);
   }
-  void Ask(CandidateSet<K> candidates, Purpose purpose, const Engine<K>& asking);
   void AskFor(Eigen::MatrixXd&& points, Purpose purpose);
 
   // What follows when a query source is done.
@@ -108,42 +131,15 @@ class Scheduler final : public QuerySource {
   const Specification& spec_;
   const Interruption& interruption_;
   Engine<K> engine_;
-  TangentFinder tangent_finder_;
-
-  // One of these is the query source.
-  std::unique_ptr<RoundTrip<K>> trip_;
-  std::unique_ptr<Certification> certification_;
-  Purpose purpose_ = Purpose::kSeeds;  // of the trip
-  // The initial sample.
-  struct {
-    std::unique_ptr<Sampler<K>> sampler;   // while it is made
-    std::unique_ptr<Sampler<K>> finished;  // until refinement is planned on its surrogate
-    bool is_done = false;
-  } sampling_;
-  // Queries in addition to the source, or alone before the run ends.
-  CreaseSearch<K> creases_;
-  std::optional<Termination> end_;  // how the run ends once that is done
-  std::optional<Outcome> outcome_;
-
-  std::uint64_t rounds_ = 0;  // answered
-  Counts counts_;
-  typename Engine<K>::Change change_;  // since TakeChange
-  ProgressMeter progress_meter_;
-  RepeatCheck repeat_check_;
-  WallCheck wall_check_;
+  CurrentSource<K> source_;
+  InitialSample<K> sample_;
+  CreaseSearch<K> creases_;  // queries in addition to the source, or alone before the run ends
   SparePoints spare_points_;
-  struct {
-    BoxWatch box;
-    StallWatch stall;
-    BoundaryDetector boundary;
-    TableCheck table;
-  } watches_;
-  struct {
-    bool speculation_failed = false;   // the last round of candidates inserted nothing
-    bool covers_box = false;           // each seed of a covered box has its closest point
-    std::optional<PieceOfWall> piece;  // that the mesh lacked at some time
-    std::string inside;                // why no seed's point is in M with boundary, if so
-  } noted_;
+  AnswerChecks checks_;
+  Noticed noticed_;
+  RunCounts counts_;
+  typename Engine<K>::Change change_;  // since TakeChange
+  RunEnd end_;
 };
 
 STELLATE_DECLARE_CLASS(Scheduler)

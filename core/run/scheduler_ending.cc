@@ -12,15 +12,16 @@ namespace stellate::core {
 // Ends the run, once it is known whether a crease keeps it from a better end.
 template <int K>
 void Scheduler<K>::End(Termination termination) {
-  const bool may_be_creased = K < spec_.ambient_dimension && !watches_.box.has_left();
+  const bool may_be_creased = K < spec_.ambient_dimension && !noticed_.box.has_left();
   if (may_be_creased && !creases_.is_asking()) {
     if (termination == Termination::kNoProgress)
       creases_.ProbeFaults(engine_);
-    else if (certification_ && certification_->certificate().epsilon_over_reach > kCoarse)
+    else if (source_.certification() &&
+             source_.certification()->certificate().epsilon_over_reach > kCoarse)
       creases_.ProbeAll(engine_.stars());
   }
   if (!may_be_creased || !creases_.is_asking()) return Finish(termination);
-  end_ = termination;
+  end_.pending = termination;
 }
 
 template <int K>
@@ -30,25 +31,24 @@ void Scheduler<K>::Fail(Status reason) {
 
 template <int K>
 void Scheduler<K>::Finish(Termination termination, Status failure) {
-  if (outcome_) return;
-  outcome_ = Outcome{termination, std::move(failure), {}};
+  if (end_.outcome) return;
+  end_.outcome = Outcome{termination, std::move(failure), {}};
   // The initial sample has no stars yet.
-  if (sampling_.sampler && termination == Termination::kRoundBudget) CommitSample();
+  if (sample_.is_growing() && termination == Termination::kRoundBudget) CommitSample();
   // The round was absorbed, so that its delta reports the simplices added here.
   if (termination != Termination::kCancelled && termination != Termination::kOracleFailed)
     engine_.CompleteStars(&change_.added, &change_.removed);
-  sampling_.sampler.reset();
-  sampling_.finished.reset();
+  sample_.Drop();
   DescribeEnding();
-  certification_.reset();
+  source_.Close();
 }
 
 template <int K>
 void Scheduler<K>::DescribeEnding() {
-  const Termination termination = outcome_->termination;
-  Certificate& certificate = outcome_->certificate;
+  const Termination termination = end_.outcome->termination;
+  Certificate& certificate = end_.outcome->certificate;
   if (termination == Termination::kConverged) {
-    certificate = certification_->certificate();
+    certificate = source_.certification()->certificate();
     WarnOfCompromises<K>(engine_, spec_.epsilon, &certificate);
     // It may be the cause of all other problems.
     if (creases_.crease()) {
@@ -56,10 +56,12 @@ void Scheduler<K>::DescribeEnding() {
       certificate.only_too_coarse = false;
     }
   } else {
-    certificate.verdict = Message("not certified: the run ended as ", TerminationName(termination),
-                                  certification_ ? " when every rule held, before it was certified"
-                                                 : " before every rule held");
-    if (!outcome_->failure.message.empty()) certificate.verdict += ": " + outcome_->failure.message;
+    certificate.verdict =
+        Message("not certified: the run ended as ", TerminationName(termination),
+                source_.certification() ? " when every rule held, before it was certified"
+                                        : " before every rule held");
+    if (!end_.outcome->failure.message.empty())
+      certificate.verdict += ": " + end_.outcome->failure.message;
     if (termination == Termination::kVertexBudget)
       certificate.verdict += ": allow more vertices (max_vertices), or take a larger epsilon";
     if (termination == Termination::kRoundBudget)
@@ -69,29 +71,29 @@ void Scheduler<K>::DescribeEnding() {
       DescribeUnfinished<K>(engine_, spec_.epsilon, !creases_.crease(), &certificate);
     if (termination == Termination::kNoProgress)
       certificate.verdict +=
-          "; " + (watches_.box.has_left() ? watches_.box.WhyStopped()
+          "; " + (noticed_.box.has_left() ? noticed_.box.WhyStopped()
                   : creases_.crease()
                       ? DescribeCrease(*creases_.crease())
                       : WhatIsLeft<K>(engine_, certificate.inconsistent_simplices) +
-                            watches_.boundary.Describe(engine_.stars().sample().d()));
+                            noticed_.boundary.Describe(engine_.stars().sample().d()));
     // A front that never closes may be where the manifold ends.
     const bool spent =
         termination == Termination::kVertexBudget || termination == Termination::kRoundBudget;
-    if (engine_.boundary().policy().MayEndUndeclared() && !watches_.box.has_left() &&
+    if (engine_.boundary().policy().MayEndUndeclared() && !noticed_.box.has_left() &&
         !creases_.crease() &&
         (termination == Termination::kNoProgress ||
-         (spent && !watches_.boundary.offsets().empty())))
+         (spent && !noticed_.boundary.offsets().empty())))
       certificate.verdict += Message(". ", kDeclareWalls);
   }
   if (interruption_.raised()) return;  // the mesh was never reported
-  watches_.box.Warn(&certificate);
+  noticed_.box.Warn(&certificate);
   if (termination == Termination::kNoProgress && !creases_.crease())
     ExplainInactiveWall<K>(engine_, spec_.walls, &certificate);
   // The one that explains the most leads in the end.
   ExplainSharpest<K>(engine_, termination == Termination::kNoProgress, &certificate);
   ExplainNearCorners<K>(engine_, spec_.epsilon, &certificate);
   if (termination == Termination::kConverged || termination == Termination::kNoProgress)
-    ExplainWallCurvature<K>(engine_, spec_.epsilon, noted_.piece, &certificate);
+    ExplainWallCurvature<K>(engine_, spec_.epsilon, noticed_.piece, &certificate);
 }
 
 #define STELLATE_EACH(K)                                   \

@@ -3,13 +3,13 @@
 #include <bit>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "core/base/message.h"
 #include "core/base/parallel.h"
 #include "core/refinement/corners.h"
 #include "core/refinement/face_seeds.h"
 #include "core/run/ending.h"
-#include "core/run/sampler_choice.h"
 #include "core/run/scheduler.h"
 #include "core/sampling/seeding.h"
 
@@ -34,7 +34,7 @@ void Scheduler<K>::AskForSeeds(const Eigen::MatrixXd& seeds) {
 
 template <int K>
 void Scheduler<K>::KeepFaceSeeds() {
-  const AnsweredPoints& answers = trip_->answers();
+  const AnsweredPoints& answers = source_.trip()->answers();
   std::uint64_t inside = 0;
   for (Eigen::Index c = 0; c < answers.points.cols(); ++c) {
     const auto i = static_cast<std::size_t>(c);
@@ -53,16 +53,17 @@ void Scheduler<K>::KeepFaceSeeds() {
     spare_points_.KeepEnd(answers, c);
     engine_.boundary().KeepSeed(answers.points.col(c), answers.walls[i], answers.tangents.col(c));
   }
-  if (inside == 0) noted_.inside = WhyNothingInside(spec_, answers);
+  if (inside == 0) noticed_.inside = WhyNothingInside(spec_, answers);
   if (inside == 0 && !engine_.boundary().has_discoveries())
-    return Fail({StatusCode::kNoSeeds, noted_.inside});
-  Eigen::MatrixXd steps = wall_check_.Questions(answers);
+    return Fail({StatusCode::kNoSeeds, noticed_.inside});
+  Eigen::MatrixXd steps = checks_.walls.Questions(answers);
   if (steps.cols() > 0) AskFor(std::move(steps), Purpose::kWallCheck);
 }
 
 template <int K>
 void Scheduler<K>::JudgeWalls() {
-  if (Status status = wall_check_.Judge(trip_->answers()); !status.ok()) Fail(std::move(status));
+  if (Status status = checks_.walls.Judge(source_.trip()->answers()); !status.ok())
+    Fail(std::move(status));
 }
 
 // Queries points of walls where the mesh should end, but does not: faces are meshed from there.
@@ -86,9 +87,9 @@ bool Scheduler<K>::AskForSparesOnWalls(const PointsOnWalls& points) {
   CandidateSet<K> candidates;
   candidates.planned = spare_points_.ChooseOnWalls(news, epsilon);
   if (candidates.planned.size() == 0) return false;
-  noted_.piece = {std::countr_zero(candidates.planned.walls.front()),
-                  candidates.planned.points.col(0)};
-  spare_points_.GiveBack(certification_->TakeKnown());
+  noticed_.piece = {std::countr_zero(candidates.planned.walls.front()),
+                    candidates.planned.points.col(0)};
+  spare_points_.GiveBack(source_.certification()->TakeKnown());
   Ask(std::move(candidates), Purpose::kSpares);
   return true;
 }
@@ -99,8 +100,8 @@ template <int K>
 bool Scheduler<K>::AskForInterior() {
   if (engine_.stars().size() == 0) return false;
   AnsweredPoints seeds = FaceSeeds<K>(engine_.parts()).OfInterior();
-  sampling_.sampler = SamplerFor<K>(engine_, spec_, seeds);
-  if (sampling_.sampler) sampling_.sampler->Begin(seeds);
+  std::vector<std::uint8_t> used;
+  sample_.Begin(engine_, spec_, seeds, &used);
   if (AskForSample()) return true;
   CommitSample();
   return false;
@@ -139,7 +140,7 @@ bool Scheduler<K>::PlanFaces(std::optional<std::vector<Target<K>>>* targets) {
       }
       *targets = engine_.Plan();
     }
-    watches_.stall.NoteFrontMoved();
+    noticed_.stall.NoteFrontMoved();
     if (!*targets) {
       LeaveFaces();
       return false;
@@ -150,7 +151,8 @@ bool Scheduler<K>::PlanFaces(std::optional<std::vector<Target<K>>>* targets) {
 
 template <int K>
 void Scheduler<K>::SettleCrowds() {
-  const std::optional<CrowdedCorner> bad = Corners<K>(engine_.parts()).Settle(trip_->answers());
+  const std::optional<CrowdedCorner> bad =
+      Corners<K>(engine_.parts()).Settle(source_.trip()->answers());
   if (bad) Fail({StatusCode::kOracleBadConormal, WhyTooCrowded(*bad, K)});
 }
 
@@ -159,7 +161,7 @@ void Scheduler<K>::SettleCrowds() {
 template <int K>
 void Scheduler<K>::LeaveFaces() {
   if (!engine_.LeaveStage()) return End(Termination::kNoProgress);
-  watches_.stall = StallWatch(1);  // next to them not all can be fixed: with less patience
+  noticed_.stall = StallWatch(1);  // next to them not all can be fixed: with less patience
   if (engine_.boundary().stage() == K && AskForInterior()) return;
   Plan();
 }

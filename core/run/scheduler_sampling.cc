@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "core/refinement/exchange.h"
-#include "core/run/sampler_choice.h"
 #include "core/run/scheduler.h"
 #include "core/sampling/seeding.h"
 
@@ -36,17 +36,15 @@ void RefineTangents(const Specification& spec, TangentFinder& finder, Engine<K>*
 
 template <int K>
 void Scheduler<K>::InsertSeeds() {
-  const AnsweredPoints& answers = trip_->answers();
+  const AnsweredPoints& answers = source_.trip()->answers();
   const Eigen::Index count = answers.points.cols();
   const auto found = std::count(answers.found.begin(), answers.found.end(), 1);
-  noted_.covers_box = spec_.cover_box && found == count;
+  noticed_.covers_box = spec_.cover_box && found == count;
   if (found == 0) return Fail({StatusCode::kNoSeeds, WhyNoSeeds(spec_, count)});
-  repeat_check_.Sample(answers);
+  checks_.repeat.Sample(answers);
   std::vector<std::uint8_t> used(static_cast<std::size_t>(count), 0);
-  sampling_.sampler = SamplerFor<K>(engine_, spec_, answers);
-  if (sampling_.sampler) {
-    used = sampling_.sampler->Begin(answers);
-    progress_meter_.Know(answers, used);
+  if (sample_.Begin(engine_, spec_, answers, &used)) {
+    counts_.meter.Know(answers, used);
     return spare_points_.Keep(answers, used);
   }
   for (Eigen::Index c = 0; c < count; ++c) {
@@ -58,35 +56,35 @@ void Scheduler<K>::InsertSeeds() {
     if (used[i])
       engine_.Append(answers, c);
     else
-      ++counts_.duplicates;
+      ++counts_.counts.duplicates;
   }
-  progress_meter_.Know(answers, used);
+  counts_.meter.Know(answers, used);
   spare_points_.Keep(answers, used);
 }
 
 template <int K>
 void Scheduler<K>::AddAnswered() {
   const std::vector<std::uint8_t> used =
-      sampling_.sampler->Take(trip_->candidates(), trip_->answers());
-  counts_.inserted_size += static_cast<std::uint64_t>(std::count(used.begin(), used.end(), 1));
-  spare_points_.Keep(trip_->answers(), used);
+      sample_.Take(source_.trip()->candidates(), source_.trip()->answers());
+  counts_.counts.inserted_size +=
+      static_cast<std::uint64_t>(std::count(used.begin(), used.end(), 1));
+  spare_points_.Keep(source_.trip()->answers(), used);
 }
 
 // Returns whether the initial sample is still incomplete, and queries more of it. Plan ends a
 // sample that has no end.
 template <int K>
 bool Scheduler<K>::AskForSample() {
-  if (!sampling_.sampler) return false;
-  watches_.box.Look(engine_.stars().sample().points().data(), engine_.stars().size());
+  if (!sample_.is_growing()) return false;
+  noticed_.box.Look(engine_.stars().sample().points().data(), engine_.stars().size());
   CandidateSet<K> candidates;
-  if (!watches_.box.has_left()) candidates = sampling_.sampler->Next(rounds_);
+  if (!noticed_.box.has_left()) candidates = sample_.Next(counts_.answered);
   if (candidates.size() == 0) {
-    sampling_.finished = std::move(sampling_.sampler);
-    sampling_.is_done = true;
-    if (!spec_.oracle.tangent_basis) RefineTangents<K>(spec_, tangent_finder_, &engine_);
+    sample_.Complete();
+    if (!spec_.oracle.tangent_basis) RefineTangents<K>(spec_, source_.finder(), &engine_);
     return false;
   }
-  Ask(std::move(candidates), Purpose::kSample, sampling_.sampler->asking());
+  source_.Ask(sample_.asking(), std::move(candidates), Purpose::kSample);
   return true;
 }
 

@@ -232,7 +232,14 @@ void TangentFinder::Ask() {
   }
 }
 
-void TangentFinder::Absorb(const AnswerBlock& answers) {
+std::vector<QueryBlock> TangentFinder::Questions() {
+  std::vector<QueryBlock> blocks;
+  if (!open_.empty()) blocks.push_back(std::exchange(block_, {}));
+  return blocks;
+}
+
+void TangentFinder::Absorb(const std::vector<AnswerBlock>& blocks) {
+  const AnswerBlock& answers = blocks.front();
   const int m = guessed_ ? k_ : std::min(k_ + 4, d_);
   ParallelFor(open_.size(), [&](std::size_t i) {
     const Eigen::Index point = open_[i];

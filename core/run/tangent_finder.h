@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/batch.h"
+#include "core/query_source.h"
 #include "core/run/tangent_fits.h"
 
 namespace stellate::core {
@@ -21,13 +21,13 @@ namespace stellate::core {
 // point) k directions are enough, else k + 4 random ones, for any d: 2k closest points a vertex.
 //
 //   finder.Start({points, guesses, {}, asked});
-//   while (const QueryBlock* block = finder.Next()) finder.Absorb(answers to *block);
+//   // ... drive it as a QuerySource, then:
 //   finder.tangents();
 //
 // Normals are read only after differences have agreed with them, and never again once one has not:
 // closest points of an oracle that is not exact, and those on a crease or where M ends, do not lie
 // straight below what was asked.
-class TangentFinder {
+class TangentFinder final : public QuerySource {
  public:
   // step: the length of the differences. most_error: the largest error_length of a point. A point
   // with a larger one is queried once more, along the tangents found.
@@ -53,9 +53,11 @@ class TangentFinder {
   // all around.
   void Refine(const Eigen::MatrixXd& points, Eigen::MatrixXd* tangents);
 
-  // Returns the closest-point queries still needed, or nullptr once tangents() is complete.
-  const QueryBlock* Next() const { return open_.empty() ? nullptr : &block_; }
-  void Absorb(const AnswerBlock& answers);
+  // One block of closest points.
+  std::vector<QueryBlock> Questions() override;
+  void Absorb(const std::vector<AnswerBlock>& answers) override;
+  bool asks_for_tangents() const override { return true; }
+  bool is_done() const { return open_.empty(); }  // tangents() is complete
 
   // (k rows of d) x n, orthonormal. If a point's tangents were not found, its column is zero and ok
   // is 0: some closest point was missing, or M does not look k-dimensional there.

@@ -247,10 +247,10 @@ inline CertifiedRun Certify(
     KnownOfManifold known = {}) {
   CertifiedRun run;
   Certifier certifier(spec, mesh.View(), facts, std::move(known));
-  while (const std::vector<QueryBlock>* blocks = certifier.NextBlocks()) {
+  for (std::vector<QueryBlock> blocks; !(blocks = certifier.Questions()).empty();) {
     ++run.rounds;
     std::vector<AnswerBlock> answers;
-    for (const QueryBlock& block : *blocks) {
+    for (const QueryBlock& block : blocks) {
       AnswerBlock answer;
       answer.points.resize(block.points.rows(), block.size());
       for (Eigen::Index j = 0; j < block.size(); ++j) {

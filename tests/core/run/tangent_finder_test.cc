@@ -35,16 +35,16 @@ class TangentFinderTest : public ::testing::TestWithParam<std::string> {
   template <typename Missing>
   Eigen::Index Finish(Missing&& missing) {
     Eigen::Index asked = 0;
-    while (const QueryBlock* block = finder_.Next()) {
-      EXPECT_EQ(block->kind, QueryKind::kClosestPoint);
-      EXPECT_FALSE(block->want.tangents);
+    for (std::vector<QueryBlock> blocks; !(blocks = finder_.Questions()).empty();) {
+      EXPECT_EQ(blocks.front().kind, QueryKind::kClosestPoint);
+      EXPECT_FALSE(blocks.front().want.tangents);
       AnswerBlock answers;
-      answers.points = manifold_->ClosestPoint(block->points).points;
-      answers.found.assign(static_cast<std::size_t>(block->size()), 1);
-      for (Eigen::Index j = 0; j < block->size(); ++j)
+      answers.points = manifold_->ClosestPoint(blocks.front().points).points;
+      answers.found.assign(static_cast<std::size_t>(blocks.front().size()), 1);
+      for (Eigen::Index j = 0; j < blocks.front().size(); ++j)
         if (missing(asked + j)) answers.found[static_cast<std::size_t>(j)] = 0;
-      asked += block->size();
-      finder_.Absorb(answers);
+      asked += blocks.front().size();
+      finder_.Absorb({answers});
     }
     return asked;
   }
@@ -196,11 +196,11 @@ class NormalsTest : public ::testing::Test {
     points_ = of.points;
     finder_.Start(std::move(of));
     Eigen::Index asked = 0;
-    while (const QueryBlock* block = finder_.Next()) {
-      asked += block->size();
+    for (std::vector<QueryBlock> blocks; !(blocks = finder_.Questions()).empty();) {
+      asked += blocks.front().size();
       AnswerBlock answers;
-      answers.points = answer(block->points);
-      finder_.Absorb(answers);
+      answers.points = answer(blocks.front().points);
+      finder_.Absorb({answers});
     }
     return asked;
   }
@@ -275,11 +275,11 @@ TEST_F(NormalsTest, AreNoLongerReadOnceOneDisagreed) {
   ToByVector(basis.col(0).data(), 3, 2, guess.data());
   of.guesses = {guess.data()};
   finder_.Start(std::move(of));
-  ASSERT_NE(finder_.Next(), nullptr);  // it is turned too far from its guess
-  while (const QueryBlock* block = finder_.Next()) {
+  ASSERT_FALSE(finder_.is_done());  // it is turned too far from its guess
+  for (std::vector<QueryBlock> blocks; !(blocks = finder_.Questions()).empty();) {
     AnswerBlock answers;
-    answers.points = Closest(block->points);
-    finder_.Absorb(answers);
+    answers.points = Closest(blocks.front().points);
+    finder_.Absorb({answers});
   }
   EXPECT_FALSE(finder_.reads_normals());
 }
@@ -302,8 +302,8 @@ TEST(TangentFinder, RefusesTheWrongDimension) {
     TangentFinder finder(too_many ? 2 : 1, manifold->ambient_dimension(), kStep, 1);
     const Eigen::MatrixXd points = RandomPointsOn(*manifold, kPoints, 3);
     finder.Start({points, std::vector<const double*>(kPoints, nullptr)});
-    while (const QueryBlock* block = finder.Next())
-      finder.Absorb({manifold->ClosestPoint(block->points).points, {}, {}, {}, {}, {}});
+    for (std::vector<QueryBlock> blocks; !(blocks = finder.Questions()).empty();)
+      finder.Absorb({{manifold->ClosestPoint(blocks.front().points).points, {}, {}, {}, {}, {}}});
     int refused = 0;
     for (const std::uint8_t ok : finder.ok()) refused += !ok;
     EXPECT_GE(refused, kPoints * 3 / 4) << manifold->facts().spec;

@@ -6,7 +6,8 @@
 
 namespace stellate::core {
 
-// A source of queries: the initial sample, a round, tangent spaces, the certificate. Drive it so:
+// A source of queries: a run, a round, tangent spaces, the certificate, edges at creases. Drive it
+// so:
 //
 //   while (!(questions = source.Questions()).empty()) source.Absorb(answers of the questions);
 class QuerySource {
