@@ -122,8 +122,8 @@ SessionJournal::Known RecordedMesh::BeginRound(const core::QueryBatch& batch) {
     pending_.clear();
     answers_.reset();
   }
-  written_.clear();
-  next_part_ = 0;
+  parts_.written.clear();
+  parts_.next = 0;
   if (batch.round <= rounds_) return ReadRound(batch);
   if (std::exchange(has_answers_, false) && batch.round == rounds_ + 1) {
     return ReadPartOfRound(batch);
@@ -201,18 +201,19 @@ SessionJournal::Known RecordedMesh::ReadPartOfRound(const core::QueryBatch& batc
           }
           if (found != Found::kYes) break;
           others = others || some.questions != questions_;
-          next_part_ = part + 1;
+          parts_.next = part + 1;
           for (PartOfRound& one : some.parts) {
-            written_.push_back({one.block_index, one.first, one.first + one.answers.points.cols()});
+            parts_.written.push_back(
+                {one.block_index, one.first, one.first + one.answers.points.cols()});
             known.parts.push_back(std::move(one));
           }
         }
         if (!others) return true;
-        written_.clear();
+        parts_.written.clear();
         known = {};
         return records->Transact([&] {
-          while (next_part_ > 0) {
-            if (!records->Remove({id_, RecordKind::kAnswers, number, --next_part_})) return false;
+          while (parts_.next > 0) {
+            if (!records->Remove({id_, RecordKind::kAnswers, number, --parts_.next})) return false;
           }
           return true;
         });
@@ -242,7 +243,7 @@ bool RecordedMesh::HasAnswers() const {
 
 bool RecordedMesh::WriteAnswers(Records* records) {
   std::shared_ptr<const Round> round;
-  draft_.next_part = next_part_;
+  draft_.next = parts_.next;
   {
     const std::lock_guard lock(mutex_);
     draft_.written = Merged(std::exchange(pending_, {}));
@@ -250,13 +251,13 @@ bool RecordedMesh::WriteAnswers(Records* records) {
   }
   // An owner who has used up his share hears of it at the end of the round.
   if (draft_.written.empty() || RefuseShare(1)) return true;
-  return PutAnswers(records, round->answers, draft_.written, &draft_.next_part);
+  return PutAnswers(records, round->answers, draft_.written, &draft_.next);
 }
 
 void RecordedMesh::AnswersWritten(bool written) {
-  if (written && draft_.next_part > next_part_) {
-    next_part_ = draft_.next_part;
-    written_.insert(written_.end(), draft_.written.begin(), draft_.written.end());
+  if (written && draft_.next > parts_.next) {
+    parts_.next = draft_.next;
+    parts_.written.insert(parts_.written.end(), draft_.written.begin(), draft_.written.end());
   }
   draft_.written.clear();
 }
@@ -280,8 +281,9 @@ std::optional<MeshFailure> RecordedMesh::WriteRound(const core::QueryBatch& batc
   RecordedRound round{questions_, DigestOf(answers), 0, standing};
   auto failure = Do("the answers of a round", FairMutex::Place::kLast, 1, [&](Records* records) {
     return records->Transact([&] {
-      std::int64_t parts = next_part_;
-      if (!PutAnswers(records, answers, Missing(Merged(written_), sizes_), &parts)) return false;
+      std::int64_t parts = parts_.next;
+      if (!PutAnswers(records, answers, Missing(Merged(parts_.written), sizes_), &parts))
+        return false;
       round.parts = static_cast<std::uint64_t>(parts);
       return records->Put({id_, RecordKind::kRound, round_}, EncodeRound(round));
     });

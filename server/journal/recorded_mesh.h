@@ -77,14 +77,14 @@ class RecordedMesh final : public SessionJournal,
   std::atomic<std::int64_t> epoch_{0};  // Records::EpochOf then
 
   // Only for the thread that has locked the records.
-  std::uint64_t counted_ = 0;         // of its bytes, for its owner
-  bool has_history_ = false;          // some of it
-  std::vector<AnswerRange> written_;  // of the round
-  std::int64_t next_part_ = 0;
-  struct {
-    std::int64_t next_part = 0;
+  std::uint64_t counted_ = 0;  // of its bytes, for its owner
+  bool has_history_ = false;   // some of it
+  struct Parts {
+    std::int64_t next = 0;
     std::vector<AnswerRange> written;
-  } draft_;  // in force once the transaction is committed
+  };
+  Parts parts_;  // of the round
+  Parts draft_;  // further ones, in force once the transaction is committed
 
   // For the session's thread alone:
   std::uint64_t rounds_ = 0;  // that are complete

@@ -12,12 +12,14 @@ import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 MOST_MEMBERS, MOST_METHODS = 20, 40
+FEWER_MEMBERS = {"core/run/scheduler.h Scheduler": 12}  # what all else hangs on
 
 CLASS = re.compile(r"^class (\w+)[^;{]*\{\n(.*?)^\};", re.M | re.S)
 MEMBER = re.compile(r"(?<![\w.>(])\w+_(?:\[[^\]]*\])*(?= = |\{|;|,)")
 METHOD = re.compile(r"(?:[\w:<>,&*\[\] ]*?\s[&*]*)??(?:~?\w+|operator[^ \w]{1,3})\(")
 NEITHER = re.compile(
-    r"//|using |friend |typedef |template|static_assert|static constexpr \w+ k|[}:]|struct |class |enum "
+    r"//|using |friend |typedef |template|static_assert|static constexpr \w+ k"
+    r"|[}:](?! \w+_;)|struct |class |enum "
 )
 
 
@@ -48,7 +50,7 @@ class ClassLimits(unittest.TestCase):
     def test_no_class_is_larger(self) -> None:
         for name, (members, methods) in classes().items():
             with self.subTest(name):
-                self.assertLessEqual(members, MOST_MEMBERS, "members")
+                self.assertLessEqual(members, FEWER_MEMBERS.get(name, MOST_MEMBERS), "members")
                 self.assertLessEqual(methods, MOST_METHODS, "methods")
 
     def test_members_and_methods_are_counted(self) -> None:
@@ -70,12 +72,15 @@ class ClassLimits(unittest.TestCase):
   struct Part {
     int part_ = 0;
   };
+  struct {
+    int first_ = 0;
+  } part_;
   int d_;
   double low_ = 0, high_{1};
   std::array<int, 3> few_[2];
   std::function<void(int)> on_end_;
 """
-        self.assertEqual(count(body), (5, 5))
+        self.assertEqual(count(body), (6, 5))
 
 
 if __name__ == "__main__":
