@@ -80,6 +80,16 @@ class CheckedPoints:
         if label is not None:
             _set(self.spec, "label", label)
 
+    def divide(self, units: np.ndarray) -> None:
+        """To the coordinates x / units, (d,). Raises: InvalidArgument."""
+        with np.errstate(over="ignore"):
+            divided = self.points / units
+        if not np.isfinite(divided).all():
+            raise InvalidArgument(f"points / scale are not finite: the scale is {units.tolist()}")
+        self.points = divided
+        if self.tangents is not None:
+            self.tangents = _orthonormal(self.tangents / units[:, None])
+
 
 def _set(message: Any, name: str, value: Any) -> None:
     try:

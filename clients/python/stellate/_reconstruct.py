@@ -10,6 +10,8 @@ import threading
 from collections.abc import Sequence
 from typing import Any, Callable, Union
 
+import numpy as np
+
 from ._credentials import Credentials
 from ._download import OnProgress, assemble
 from ._files.formats import check_save
@@ -30,6 +32,7 @@ from .errors import (
     StellateError,
     protocol_error,
 )
+from .oracles._units import about_units, units_of
 from .progress import Patience, somebody_looks_on
 from .report import Progress
 from .server import Server
@@ -50,6 +53,7 @@ def reconstruct(
     *,
     weights: Weights = "auto",
     steiner: bool = False,
+    scale: Any = None,
     credentials: Credentials | None = None,
     require_certified: bool = False,
     save: Path | Sequence[Path] = (),
@@ -83,6 +87,9 @@ def reconstruct(
         Delaunay complex, and is refused where stars disagree; `drop` and `steiner` are not used.
       steiner: vertices may be added where neither tilings nor weights make stars agree, nor leaving
         points out: at most one for each hundred points, or 16. They come after the points.
+      scale: (d,) positive lengths, about how far the manifold goes along each axis, where axes have
+        different units, or one for all: the complex is built in the coordinates x / scale. `noise`, `reach`,
+        all lengths and places in the report are in these; points, tangents and the mesh are in x.
       credentials: a stellate.Credentials for `server`, where it wants TLS or a token.
       require_certified: a mesh that is not certified is an error, NotCertified.
       save: a file or several to write the mesh to, as for stellate.mesh.
@@ -113,6 +120,10 @@ def reconstruct(
     checked = CheckedPoints(
         points, dimension, tangents, noise, reach, drop, closed, limits, label, weights, steiner
     )  # fmt: skip
+    given = checked.points
+    units = None if scale is None else units_of(scale, given.shape[1])
+    if units is not None:
+        checked.divide(units)
     files = [save] if isinstance(save, (str, os.PathLike)) else list(save)
     for file in files:
         check_save(file, int(dimension), checked.points.shape[1])
@@ -127,6 +138,8 @@ def reconstruct(
             client = stack.enter_context(Client(client, credentials))
         mesh = _run(client, checked, on_progress, interrupts)
     mesh = dataclasses.replace(mesh, coordinate_names=column_names(points))
+    if units is not None:
+        mesh = _in_own_coordinates(mesh, given, units)
     for file in files:
         try:
             mesh.save(file)
@@ -138,6 +151,15 @@ def reconstruct(
             mesh=mesh,
         )
     return mesh
+
+
+def _in_own_coordinates(mesh: FinishedMesh, given: np.ndarray, units: np.ndarray) -> FinishedMesh:
+    """A mesh of the points given / units."""
+    points = mesh.points * units
+    points[: len(given)] = given[: len(points)]  # to the last bit
+    smoothed = None if mesh.smoothed is None else mesh.smoothed * units
+    report = mesh.report.with_words(f"{about_units(units)}, places, too")
+    return dataclasses.replace(mesh, points=points, smoothed=smoothed, report=report)
 
 
 class _Sending(threading.Thread):

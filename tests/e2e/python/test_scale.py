@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+import samples
 import stellate
 from stellate import oracles, solids
 
@@ -265,3 +266,34 @@ def test_the_command_line_takes_a_scale(tmp_path, monkeypatch, capfd):
     with pytest.raises(SystemExit):
         main(["mesh", *given[:-1], "1;2", "-q"])
     assert "one for each axis" in capfd.readouterr().err
+
+
+def test_points_alone_are_reconstructed_in_scaled_coordinates(server, rng):
+    torus, units = samples.torus(rng), np.array([2.0**-7, 512.0, 1.0])  # which divide exactly
+    plain = stellate.reconstruct(torus, 2, server=server)
+    scaled = stellate.reconstruct(torus * units, 2, scale=units, server=server)
+    assert scaled.certified, scaled.report
+    assert scaled.points.tobytes() == (torus * units).tobytes()
+    assert np.array_equal(scaled.simplices, plain.simplices)
+    assert scaled.places.tolist() == plain.places.tolist()
+    words = "; coordinates were divided by 0.0078125, 512, 1, and lengths and angles are of these, places, too"
+    assert scaled.report.certificate.verdict == plain.report.certificate.verdict + words
+    assert words in " ".join(str(scaled.report).split())
+    assert str(scaled.report).count("\n") > 5
+    noisy = torus + 0.01 * rng.normal(size=torus.shape)
+    smooth = stellate.reconstruct(noisy, 2, noise=0.01, server=server).smoothed
+    again = stellate.reconstruct(noisy * units, 2, noise=0.01, scale=units, server=server)
+    assert np.array_equal(again.smoothed, smooth * units)
+
+
+def test_tangents_are_scaled_with_their_points(server, rng):
+    circle = np.linspace(0, 2 * np.pi, 100, endpoint=False)
+    points = np.stack([np.cos(circle), 1000 * np.sin(circle)], axis=1)
+    tangents = np.stack([-np.sin(circle), 1000 * np.cos(circle)], axis=1)[:, :, None]
+    mesh = stellate.reconstruct(points, 1, tangents, scale=[1, 1000], server=server)
+    assert mesh.certified and mesh.points.tobytes() == points.tobytes()
+    for wrong in ([1, 2, 3], [1, 0], [1, -1], "x"):
+        with pytest.raises(stellate.InvalidArgument, match="scale has to be 2 positive"):
+            stellate.reconstruct(points, 1, scale=wrong, server=server)
+    with pytest.raises(stellate.InvalidArgument, match="not finite"):
+        stellate.reconstruct(points * 1e200, 1, scale=1e-200, server=server)
