@@ -75,7 +75,11 @@ void SpecOptions::SetEpsilon(const std::string& text) {
     options.epsilon = kAuto;
     return;
   }
-  if (CLI::detail::lexical_cast(text, options.epsilon) && std::isfinite(options.epsilon)) return;
+  double length = 0;
+  if (CLI::detail::lexical_cast(text, length) && std::isfinite(length)) {
+    options.epsilon = length;
+    return;
+  }
   throw CLI::ValidationError("--epsilon", "has to be a length or auto, and is '" + text + "'");
 }
 

@@ -16,7 +16,8 @@ int main(int argc, char** argv) {
   if (!oracle) return std::cerr << oracle.error().message << "\n", 1;
   stellate::MeshOptions options;
   options.connection.server = argv[2];
-  while (std::cin >> options.epsilon) {
+  for (double epsilon = 0; std::cin >> epsilon;) {
+    options.epsilon = epsilon;
     const auto begin = std::chrono::steady_clock::now();
     const auto mesh = stellate::MeshManifold(**oracle, options);
     const std::chrono::duration<double> seconds = std::chrono::steady_clock::now() - begin;

@@ -22,7 +22,7 @@ Expected<Result> Repeat(Oracle& oracle, const MeshOptions& options, client::Run:
   if (!host) return tl::unexpected(host.error());
   Expected<client::Request> request = client::Settle(*host, oracle, options);
   if (!request) return tl::unexpected(request.error());
-  for (int retries = options.epsilon == kAuto ? automatic::kRetries : 0;; --retries) {
+  for (int retries = options.epsilon.length() ? 0 : automatic::kRetries;; --retries) {
     client::Run run(host->channel, oracle, request->options, host->IsHopeless(), watching);
     Expected<Mesh> mesh = run.Go();
     if (!mesh) return tl::unexpected(mesh.error());

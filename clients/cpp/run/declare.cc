@@ -44,7 +44,7 @@ bool Reaches(grpc::Channel* channel) {
 
 Expected<Request> Settle(const Host& host, Oracle& oracle, const MeshOptions& options) {
   Request request{options, ""};
-  if (options.epsilon == kAuto) {
+  if (!options.epsilon.length()) {
     CheckOptions check;
     check.stop = options.stop;
     Expected<ChosenEpsilon> chosen = ChooseEpsilonOn(host, oracle, check);

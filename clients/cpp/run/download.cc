@@ -81,11 +81,12 @@ class Download {
     for (const std::string& path : paths) {
       if (auto ok = CheckSave(path, k(), d()); !ok) return ok;
     }
-    return options_.revision == 0 ? Settle() : Expected<void>();
+    return options_.revision ? Expected<void>() : Settle();
   }
 
   bool IsLast() const {
-    return HasEnded(status_) && (options_.revision == 0 || options_.revision == status_.revision());
+    return HasEnded(status_) &&
+           options_.revision.value_or(status_.revision()) == status_.revision();
   }
 
   bool CanStream(const std::vector<std::string>& paths) const {
@@ -207,7 +208,7 @@ class Download {
   Expected<bool> Fetch(const Add& add) {
     v1::DownloadMeshRequest request;
     request.set_name(name_);
-    request.set_revision(options_.revision);
+    if (options_.revision) request.set_revision(*options_.revision);
     grpc::Status status;
     do {
       grpc::ClientContext& context = attempts_.Attempt();
@@ -272,6 +273,10 @@ class Download {
 Expected<std::shared_ptr<grpc::Channel>> ConnectFor(const DownloadOptions& options) {
   if (options.connection.server.empty()) {
     return Fail(ErrorCode::kRefused, "no server is given: say where the mesh is");
+  }
+  if (options.revision == 0) {
+    return Fail(ErrorCode::kRefused,
+                "revision is 0; they count from 1, and the newest one comes if none is given");
   }
   return Connect(options.connection);
 }

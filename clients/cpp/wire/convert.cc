@@ -152,7 +152,7 @@ Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
   v1::MeshSpec spec;
   spec.set_dimension(static_cast<std::uint32_t>(oracle.dimension()));
   spec.set_ambient_dimension(d);
-  spec.set_epsilon(options.epsilon);
+  spec.set_epsilon(options.epsilon.length().value_or(0));  // kAuto is settled before
   spec.mutable_oracle()->set_intersect_flat(oracle.has_intersect_flat());
   spec.mutable_oracle()->set_tangent_basis(oracle.has_tangent_basis());
   spec.mutable_oracle()->set_local_size(oracle.has_local_size());

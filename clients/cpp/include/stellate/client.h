@@ -2,7 +2,6 @@
 
 #include <cstdint>
 #include <functional>
-#include <limits>
 #include <optional>
 #include <stop_token>
 #include <string>
@@ -17,14 +16,31 @@
 
 namespace stellate {
 
-// MeshOptions::epsilon: let ChooseEpsilon choose. If the mesh is too coarse to be certified, mesh
-// again, twice at most, with what its certificate shows. No length: a length of -1 is refused.
-inline constexpr double kAuto = -std::numeric_limits<double>::infinity();
+// An epsilon that ChooseEpsilon chooses. If the mesh is too coarse to be certified, it is meshed
+// again, twice at most, with what its certificate shows.
+struct Auto {};
+inline constexpr Auto kAuto;
+
+// The largest circumradius of a simplex: a length, or kAuto.
+//
+//   options.epsilon = 0.1;
+//   options.epsilon = stellate::kAuto;
+class Epsilon {
+ public:
+  constexpr Epsilon(double length) : length_(length) {}  // NOLINT(*-explicit-*): see above
+  constexpr Epsilon(Auto) {}                             // NOLINT(*-explicit-*)
+
+  // Nothing: kAuto.
+  constexpr const std::optional<double>& length() const { return length_; }
+
+ private:
+  std::optional<double> length_;
+};
 
 // What to mesh and how. What is absent (nullopt; an empty text, function or matrix) takes the
 // server's default; see mesh.proto for each.
 struct MeshOptions {
-  double epsilon = 0;  // largest circumradius of a simplex, a length, or kAuto; required
+  Epsilon epsilon = 0;  // required
   // Called on the calling thread with each epsilon that kAuto chose; Report::epsilon_reason has the
   // last reason.
   std::function<void(double epsilon, const std::string& reason)> on_epsilon;

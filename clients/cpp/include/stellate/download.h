@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -22,9 +23,9 @@ enum class Unfinished {
 struct DownloadOptions {
   Connection connection;  // its server must be given; a download resumes after an outage
   Unfinished unfinished = Unfinished::kRefuse;
-  // Any revision that the mesh has had, however it ended; 0: the newest. Only the last revision of
-  // a mesh that is over has a report.
-  std::uint64_t revision = 0;
+  // Any revision that the mesh has had, however it ended; by default the newest. Only the last
+  // revision of a mesh that is over has a report.
+  std::optional<std::uint64_t> revision;
   // Called on the calling thread: on_progress during the wait, and on_part at each part, with the
   // vertices and simplices received and those of the whole mesh.
   std::function<void(const Progress&)> on_progress;
