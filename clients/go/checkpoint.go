@@ -158,7 +158,7 @@ func (c checkpoint) note(record []byte) error {
 	return os.Rename(draft, c.record())
 }
 
-// forgetAfter has the next call begin anew where this mesh has failed for good.
+// forgetAfter has the next call begin from the start where this mesh has failed for good.
 func (c checkpoint) forgetAfter(failure error) {
 	var ours *Error
 	over := errors.As(failure, &ours) && ours.Mesh != nil && ours.Mesh.Report != nil

@@ -61,7 +61,7 @@ func NewClient(to Connection) (*Client, error) {
 		grpc.WithDefaultCallOptions(grpc.MaxCallRecvMsgSize(largestMessage), grpc.MaxCallSendMsgSize(largestMessage)),
 		grpc.WithDefaultServiceConfig(shared.Retries), // a reply that was lost on the way
 		grpc.WithConnectParams(grpc.ConnectParams{Backoff: pauses, MinConnectTimeout: 5 * time.Second}))
-	if !private { // whose end shows at once
+	if !private { // whose end shows immediately
 		options = append(options, grpc.WithKeepaliveParams(keepalive.ClientParameters{Time: pingTime, Timeout: pingWait}))
 	}
 	if staysOnThisMachine(address) {

@@ -12,7 +12,7 @@ import (
 const unsettled = 300_000 // vertex numbers of removed simplices at least; else half of those there
 
 // growingComplex is the client's copy of a mesh that grows by deltas: vertices and simplices as of the
-// last complete revision. What comes and goes is put aside, and settled for many revisions at once.
+// last complete revision. What comes and goes is put aside, and settled for many revisions together.
 type growingComplex struct {
 	k, d           int
 	revision       uint64
@@ -21,7 +21,7 @@ type growingComplex struct {
 	rows           []uint32 // in lexicographic order
 	added, removed []uint32
 	pending        []*pb.MeshDelta
-	turned         []byte   // as Mesh.Turned, of the last revision; nil: not told
+	turned         []byte   // as Mesh.Turned, of the last revision; nil: not known
 	turnedRows     []uint32 // of a download
 	untold         bool     // a part of the download was not oriented
 	places         []string // of a download of a reconstruction

@@ -15,7 +15,7 @@ type Connection struct {
 	// Reconnect is how long a server that was there and went away is waited for; below zero: not at
 	// all. Default 3 minutes.
 	Reconnect time.Duration
-	// OnOutage is told when the server is lost and when it is back. Default: the log package.
+	// OnOutage is called when the server is lost and when it is back. Default: the log package.
 	OnOutage func(string)
 }
 
@@ -40,7 +40,7 @@ type Options struct {
 	RequireCertified bool
 	// Checkpoint is a directory, made if it is not there, in which the mesh outlives this program: the same
 	// call goes on from where the last one was interrupted or killed, or its oracle failed, and gives a mesh
-	// that is finished at once. For private servers; one that is named keeps its meshes with --data-dir.
+	// that is finished immediately. For private servers; one that is named keeps its meshes with --data-dir.
 	Checkpoint string
 	OnProgress func(*pb.Progress)
 }

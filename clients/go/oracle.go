@@ -40,13 +40,13 @@ type LocalSizer interface {
 }
 
 // Walled manifolds have a boundary: M is where all walls are at least 0 on M^, a manifold without one,
-// of which the other methods tell; it may be R^d itself. It takes a TangentBaser, too. The walls of a
+// which the other methods describe; it may be R^d itself. It takes a TangentBaser, too. The walls of a
 // face ascend.
 type Walled interface {
 	Walls() int
 	// FacePoint finds a nearest point of M^ where the walls of the face are 0, whatever the others are.
 	FacePoint(x []float64, face []uint32, points []float64, found []bool) error
-	// Clearances writes the walls' values at points [n, d], of which the sign counts, [n, Walls()].
+	// Clearances writes the walls' values at points [n, d], whose signs count, [n, Walls()].
 	Clearances(points, values []float64) error
 	// Conormals writes, at points of a face, of each of its walls the unit normal within the tangent space
 	// along which the wall's value falls: [n, len(face), d].
@@ -63,7 +63,7 @@ type Seeded interface {
 	Seeds() []float64
 }
 
-// ConcurrencySafe oracles may be called by several workers at once.
+// ConcurrencySafe oracles may be called by several workers at the same time.
 type ConcurrencySafe interface {
 	ConcurrencySafe() bool
 }

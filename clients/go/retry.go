@@ -96,7 +96,7 @@ func (o *outage) wait(ctx context.Context, err error, ours *Error) error {
 	full := min(shared.ReconnectFirstPause*math.Pow(shared.ReconnectPauseGrowth, float64(o.attempts)),
 		shared.ReconnectLongestPause)
 	o.attempts++
-	// Shortened at random: the clients of a server that comes back do not all come at once.
+	// Shortened at random: the clients of a server that comes back do not come all together.
 	pause := seconds(full * (1 - shared.ReconnectPauseJitter*rand.Float64()))
 	select {
 	case <-ctx.Done():

@@ -11,7 +11,7 @@ import (
 	pb "stellate/proto/v1"
 )
 
-const farewell = 2 * time.Second // that a worker may take to end when nobody waits for it
+const farewell = 2 * time.Second // that a worker may take to end when no call waits for it
 
 // open gives the connection's client, or that of a server which is started, and what is to be closed.
 func (to Connection) open() (*Client, func(), error) {
@@ -93,7 +93,7 @@ func (c *Client) Watch(ctx context.Context, name string, onProgress func(*pb.Pro
 	}
 }
 
-// errLeft: nobody wants more of a mesh.
+// errLeft: no caller wants more of a mesh.
 var errLeft = errors.New("left")
 
 // follow hands on a mesh at its end, and at every revision where they are wanted. It returns how the

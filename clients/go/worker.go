@@ -28,7 +28,7 @@ type WorkerOptions struct {
 
 // Serve is one more worker for a mesh: it answers the server's questions until the mesh is over, and
 // returns the state that it ended in, e.g. "SUCCEEDED". Errors of the oracle are returned as they are,
-// after the server was told. With its context this worker leaves; its work goes to others.
+// after the server has it, too. With its context this worker leaves; its work goes to others.
 func (c *Client) Serve(ctx context.Context, oracle Oracle, name string, options WorkerOptions) (string, error) {
 	checked, err := check(oracle)
 	if err != nil {
@@ -43,7 +43,7 @@ type worker struct {
 	oracle    *checkedOracle
 	hello     *pb.Hello
 	outage    *outage
-	onFailure func(error) bool // told of what the oracle returned; whether the server is to be
+	onFailure func(error) bool // gets what the oracle returned; says whether the server does
 }
 
 func (c *Client) newWorker(oracle *checkedOracle, name string, options WorkerOptions) *worker {

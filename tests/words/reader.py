@@ -4,9 +4,11 @@ and "watch log" are one."""
 from __future__ import annotations
 
 import bisect
+import io
 import pathlib
 import re
 import subprocess
+import tokenize
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
@@ -14,6 +16,14 @@ import tomllib
 
 SOURCES = {".cc", ".cpp", ".go", ".h", ".java", ".mjs", ".py", ".R", ".rb", ".rs", ".ts"}
 PROSE = {".h", ".md", ".proto"}  # sentences that users and newcomers read
+PACKAGE = re.compile(
+    r"clients/python/stellate/(?!oracles/|solids/|_walls)"
+)  # so is what help() shows
+CLIENTS = re.compile(
+    r"clients/(go/\w+(?<!_test)\.go|java/src/main/|node/src/|rust/src/|ruby/lib/|r/R/)"
+)
+_HASHES = re.compile(r"#.*")
+_SLASHES = re.compile(r"//[^\n]*|/\*.*?\*/", re.S)
 _WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[.;:,!?()\"|=<>{}]")
 _STRING = re.compile(r'"(?:[^"\\\n]|\\.)*"')
 _STRINGS = re.compile(rf"{_STRING.pattern}(?:\s*{_STRING.pattern})*")
@@ -111,6 +121,25 @@ def messages(source: str) -> str:
     return kept
 
 
+def words_of_python(source: str) -> str:
+    """The docstrings, messages and comments of a source in Python, each in its lines."""
+    lines = [" " * len(line) for line in source.split("\n")]
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type in (tokenize.STRING, tokenize.COMMENT):
+            for at, line in enumerate(token.string.split("\n"), start=token.start[0] - 1):
+                begin = token.start[1] if at == token.start[0] - 1 else 0
+                lines[at] = lines[at][:begin] + line + lines[at][begin + len(line) :]
+    return "\n".join(lines)
+
+
+def comments(source: str, suffix: str) -> str:
+    """The comments of a source of another client, each in its lines."""
+    kept = re.sub(r"[^\n]", " ", source)
+    for match in (_HASHES if suffix in {".R", ".rb"} else _SLASHES).finditer(source):
+        kept = kept[: match.start()] + match[0] + kept[match.end() :]
+    return kept
+
+
 def check(path: str, content: str, table: Table) -> list[Hit]:
     """What a file says that it should not."""
     suffix = pathlib.PurePosixPath(path).suffix
@@ -122,6 +151,10 @@ def check(path: str, content: str, table: Table) -> list[Hit]:
         hits += find(text, path, table.phrases)
     elif suffix == ".cc":
         hits += find(Text(messages(content)), path, table.phrases)
+    elif suffix == ".py" and PACKAGE.match(path):
+        hits += find(Text(words_of_python(content)), path, table.phrases)
+    elif CLIENTS.match(path):
+        hits += find(Text(comments(content, suffix)), path, table.phrases)
     return hits
 
 

@@ -100,6 +100,20 @@ std::vector<CrewMember> Crew() const;
         self.assertEqual(self.old_words("server/x/y.md", "at\nonce"), {"at once"})
         self.assertEqual(self.old_words("tests/x/y.h", "at once"), set())
 
+    def test_phrases_are_refused_in_what_help_shows_of_python(self) -> None:
+        source = 'def told(x):\n    """Returns at\n    once."""\n    # anew\n    return nobody(x)\n'
+        hits = reader.check("clients/python/stellate/x.py", source, TABLE)
+        self.assertEqual([(hit.line, hit.old) for hit in hits], [(2, "at once"), (4, "anew")])
+
+    def test_phrases_are_refused_in_comments_of_the_other_clients(self) -> None:
+        source = "let told = 1; // at once\n/** Nobody\n * anew. */\n"
+        self.assertEqual(
+            self.old_words("clients/node/src/x.ts", source), {"at once", "nobody", "anew"}
+        )
+        self.assertEqual(self.old_words("clients/go/x.go", "told() // told"), {"told"})
+        self.assertEqual(self.old_words("clients/go/x_test.go", "// told"), set())
+        self.assertEqual(self.old_words("clients/ruby/lib/x.rb", "told # anew"), {"anew"})
+
     def test_a_word_may_be_right_in_a_longer_one_and_elsewhere(self) -> None:
         word = reader.Word(("guard",), "ball", ("core",), ("lock guard",))
         text = reader.Text("std::lock_guard lock; guard")

@@ -34,7 +34,7 @@ export interface CheckReport {
   reach?: number;
   /** Components that points were seen on. */
   pieces?: number;
-  /** Queries a second, by batch size, and the batch to answer at once. */
+  /** Queries a second, by batch size, and the batch to answer in one call. */
   rates: Map<number, number>;
   bestBatch: number;
 }

@@ -66,16 +66,16 @@ export class Checkpoint {
     return { epsilon, reason, retries };
   }
 
-  /** The mesh that is there, or a new one; with `anew` a new one in its place. */
+  /** The mesh that is there, or a new one; with `again` a new one in its place. */
   async declare(
     client: Client,
     spec: MeshSpec,
     { retries, reason }: Choice,
-    anew: boolean,
+    again: boolean,
   ): Promise<MeshInfo> {
     const wanted = SpecBytes.serialize({ ...spec, label: "" });
     const { name, spec: kept } = this.read();
-    if (name && !anew && !saying(kept).equals(saying(wanted))) {
+    if (name && !again && !saying(kept).equals(saying(wanted))) {
       throw new InvalidArgument(
         `the checkpoint ${this.folder} is of a mesh of another specification: ` +
           "take another directory, or remove it",
@@ -83,7 +83,7 @@ export class Checkpoint {
     }
     let found: MeshInfo | undefined;
     for await (const info of client.list()) {
-      if (info.name === name && !anew) found = info;
+      if (info.name === name && !again) found = info;
       else if (info.name !== name) await client.delete(info.name); // forgotten, or never put down
     }
     if (found) return found;
@@ -94,7 +94,7 @@ export class Checkpoint {
     const all = Buffer.concat([Buffer.from(`${first}\n`), wanted]);
     writeFileSync(draft, all, { flag: "wx", mode: 0o600 });
     renameSync(draft, this.record); // all of it or nothing
-    if (anew) await client.delete(name);
+    if (again) await client.delete(name);
     return found;
   }
 
@@ -107,7 +107,7 @@ export class Checkpoint {
     return { name, retries: Number(retries ?? 0), reason, spec: kept.subarray(end + 1) };
   }
 
-  /** Has the next call begin anew where this mesh has failed for good. */
+  /** Has the next call begin from the start where this mesh has failed for good. */
   forgetAfter(error: unknown): void {
     const over = error instanceof StellateError && error.mesh?.report !== undefined;
     // With more room for its journal it would go on.

@@ -34,7 +34,7 @@ export interface ClientOptions {
   reconnectSeconds?: number;
   /** How long a silent server is trusted before it is pinged; twice as long to answer. Default 4. */
   keepaliveSeconds?: number;
-  /** Told when the server is lost and when it is back. Default: standard error. */
+  /** Called when the server is lost and when it is back. Default: standard error. */
   onOutage?: (message: string) => void;
 }
 
@@ -58,7 +58,7 @@ export class Client {
       );
     }
     const credentials = options.credentials ?? {};
-    // A private server needs no pings: its end shows at once.
+    // A private server needs no pings: its end shows immediately.
     const isPrivate = server instanceof Server && this.address.startsWith("unix:");
     const ping = isPrivate ? NO_PINGS : 1000 * (options.keepaliveSeconds ?? RECONNECT.keepalive);
     this.stub = new Stub(this.address, channelCredentials(this.address, credentials), {
@@ -231,7 +231,7 @@ export class Client {
     return this.worker(oracle, name, options).run();
   }
 
-  /** A worker to run() and stop(). A `quiet` one leaves it to others to tell of an outage. */
+  /** A worker to run() and stop(). A `quiet` one leaves it to others to report an outage. */
   worker(
     oracle: Oracle,
     name: string,

@@ -10,7 +10,7 @@ const UNSETTLED = 300_000; // vertex numbers of removed simplices at least; else
 
 /**
  * Vertices and simplices as of the last complete revision. What comes and goes is put aside, and
- * settled for many revisions at once. Everything throws a StellateError "PROTOCOL" where a delta does
+ * settled for many revisions together. Everything throws a StellateError "PROTOCOL" where a delta does
  * not fit what came before.
  */
 export class GrowingComplex {
@@ -22,7 +22,7 @@ export class GrowingComplex {
   private removed: Uint32Array[] = [];
   private removedLength = 0;
   private pending: MeshDelta__Output[] = [];
-  private bits?: Uint8Array; // the orientation of the last revision; not there: not told
+  private bits?: Uint8Array; // the orientation of the last revision; not there: not known
   private boundary: [number, number][] = []; // vertices and their walls, as bits
 
   constructor(
@@ -83,7 +83,7 @@ export class GrowingComplex {
     this.bits = Buffer.concat([before, chunk.turned]);
   }
 
-  /** A bit for each simplex, of a mesh that is over; undefined if it is not told. */
+  /** A bit for each simplex, of a mesh that is over; undefined if it is not known. */
   turned(): Uint8Array | undefined {
     const count = this.simplices().length / (this.k + 1);
     if (this.bits) checkBits(this.bits, count);

@@ -42,13 +42,13 @@ export interface Oracle {
   localSize?(points: Float64Array, n: number): Soon<Float64Array>;
   /**
    * How many walls bound M, at most 53, which has a boundary then: it is where all walls are at least 0
-   * on M^, a manifold without one, of which the methods above tell; it may be R^d itself. Walls take
+   * on M^, a manifold without one, which the methods above describe; it may be R^d itself. Walls take
    * tangentBasis and the three methods below. The walls of a face ascend.
    */
   walls?: number;
   /** As closestPoint, of points of M^ where the walls of the face are 0, whatever the others are. */
   facePoint?(points: Float64Array, n: number, face: number[]): Soon<Float64Array | Found>;
-  /** The walls' values at points, of which the sign counts: [n, d] -> [n, walls]. */
+  /** The walls' values at points, whose signs count: [n, d] -> [n, walls]. */
   clearances?(points: Float64Array, n: number): Soon<Float64Array>;
   /**
    * At points of a face, of each of its walls the unit normal within the tangent space along which the

@@ -23,13 +23,13 @@ export interface Patience {
   connect(): Promise<void>;
   /** Why the server will not come back, if that is known. */
   hopeless(): StellateError | undefined;
-  /** Told when the server is lost, and when it is back. */
+  /** Called when the server is lost, and when it is back. */
   onOutage(message: string): void;
   /** Something was heard of the server: it was there. */
   reached: boolean;
 }
 
-/** The attempts at one call or stream. A `quiet` one leaves it to others to tell of an outage. */
+/** The attempts at one call or stream. A `quiet` one leaves it to others to report an outage. */
 export class Outage {
   private readonly ending = new AbortController();
   private attempts = 0;
@@ -94,7 +94,7 @@ export class Outage {
     const longer = RECONNECT.pause_growth ** this.attempts;
     const full = Math.min(RECONNECT.first_pause * longer, RECONNECT.longest_pause);
     this.attempts++;
-    // Shortened at random: the clients of a server that comes back do not all come at once.
+    // Shortened at random: the clients of a server that comes back do not come all together.
     const pause = Math.min(full * (1 - RECONNECT.pause_jitter * Math.random()), left);
     try {
       await sleep(1000 * pause, undefined, { signal: this.ending.signal });

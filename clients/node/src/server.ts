@@ -10,7 +10,7 @@ import { ServerNotFound, StellateError, Unavailable } from "./errors.js";
 
 const STOP_MILLISECONDS = 10_000;
 const SAID = /^stellated listening on (.*)$/;
-// When its client goes there is nobody left to finish a mesh for. One that answers no pings is
+// When its client goes no client is left to finish a mesh for. One that answers no pings is
 // merely busy in an oracle that does not let go of the event loop.
 const OWN_FLAGS = ["--drain-seconds", "0"];
 const PRIVATE_FLAGS = ["--keepalive", "600", "--keepalive-timeout", "600"];

@@ -17,7 +17,7 @@ import type { Worker, WorkerOptions } from "./worker.js";
 import { Places } from "./places.js";
 import { indices, numbers } from "./wire.js";
 
-const FAREWELL = 2000; // milliseconds that a worker may take to end when nobody waits for it
+const FAREWELL = 2000; // milliseconds that a worker may take to end when no call waits for it
 
 /** Where the server is; without `server` one is started, and stopped afterwards. */
 export interface Connection extends ClientOptions {
@@ -31,7 +31,7 @@ export interface RunOptions
    * came out too coarse to certify, a quarter of the reach that its certificate shows, twice at most.
    */
   epsilon: number | "auto";
-  /** Told of each epsilon that "auto" takes, before it is meshed with, and why. */
+  /** Called with each epsilon that "auto" takes, before it is meshed with, and why. */
   onEpsilon?: (epsilon: number, reason: string) => void;
   /** Streams that call the oracle in parallel; more than one helps an async oracle. Default 1. */
   workers?: number;
@@ -39,7 +39,7 @@ export interface RunOptions
   /**
    * A directory, made if it is not there, in which the mesh outlives this program: the same call goes
    * on from where the last one was aborted or killed, or its oracle threw, and gives a mesh that is
-   * finished at once. For private servers; one that is named keeps its meshes with --data-dir.
+   * finished immediately. For private servers; one that is named keeps its meshes with --data-dir.
    */
   checkpoint?: string;
   /** Aborting it cancels the mesh: Cancelled, with the mesh so far in the error's `mesh`. */
@@ -68,7 +68,7 @@ export async function connect(options: Connection): Promise<[Client, () => Promi
 
 /**
  * Meshes the oracle's manifold. `requireCertified`: a mesh that is not proved good is NotCertified.
- * `save`: files to write, of which a name that cannot work is an error at once.
+ * `save`: files to write; a name that cannot work is an error before any question.
  */
 export async function mesh(
   oracle: Oracle,
@@ -88,7 +88,7 @@ export async function mesh(
 
 /**
  * The mesh as it grows, the last with its report; where epsilon "auto" was too coarse a finer mesh begins
- * anew after that, from nothing. With the name of a mesh in place of an oracle, one
+ * after that, from nothing. With the name of a mesh in place of an oracle, one
  * that others serve is watched. Leaving the loop cancels the mesh, or leaves that of others alone.
  */
 export function watch(oracle: Oracle, options: RunOptions): AsyncGenerator<Mesh>;
@@ -292,8 +292,8 @@ async function* run(oracle: Oracle, options: RunOptions, every: boolean): AsyncG
       const { epsilon, reason } = choice;
       if (reason) onEpsilon?.(epsilon, reason);
       const spec = client.specOf(oracle, { ...others, epsilon });
-      const anew = coarse !== undefined;
-      const info = await (kept?.declare(client, spec, choice, anew) ?? client.createFrom(spec));
+      const again = coarse !== undefined;
+      const info = await (kept?.declare(client, spec, choice, again) ?? client.createFrom(spec));
       next = undefined;
       for await (const grown of served(client, oracle, info, serving, every)) {
         if (grown.report) {

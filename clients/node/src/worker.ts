@@ -80,7 +80,7 @@ export class Worker {
     mesh: string,
     { worker, maxChunk }: WorkerOptions,
     private readonly outage: Outage,
-    /** Told what the oracle threw; whether the server is to be told as well. */
+    /** Gets what the oracle threw; returns whether the server gets it as well. */
     private readonly onFailure: (error: unknown) => boolean = () => true,
   ) {
     if (maxChunk !== undefined && !(Number.isInteger(maxChunk) && maxChunk >= 1)) {
@@ -217,7 +217,7 @@ async function* responses(call: Call): AsyncGenerator<ServeOracleResponse__Outpu
   }
 }
 
-/** What the oracle threw, as the server is told. */
+/** What the oracle threw, as the server gets it. */
 function words(error: unknown): string {
   const said = Buffer.from(String(error)).subarray(0, MESSAGE_BYTES).toString();
   return said.replace(/\ufffd+$/, ""); // a character that was cut

@@ -126,7 +126,7 @@ def mesh(
         epsilon^2 / (2 reach) of the manifold; 0.4 reach and below is safe. The number of vertices
         grows with epsilon^-k. "auto": a quarter of the reach that stellate.check finds, to two
         digits; where that was too coarse, twice at most, a quarter of what the certificate shows.
-        `on_progress.note`, if there is one, and the report are told what and why.
+        `on_progress.note`, if there is one, and the report say what and why.
       server: "host:port", "unix:/path", a stellate.Server or Client; None starts a stellated on a
         private unix socket and stops it afterwards.
       on_progress: called in this thread with a stellate.Progress now and then. If it raises, the
@@ -136,7 +136,7 @@ def mesh(
       require_certified: a mesh that is not certified is an error, NotCertified.
       checkpoint: a directory, made if it is not there, in which the mesh outlives this program: the
         same call goes on where it was interrupted or killed, the server died, or the oracle raised,
-        and returns at once when the mesh is finished.
+        and returns immediately when the mesh is finished.
       save: a file or several to write the mesh to, certified or not, as Mesh.save does. What their
         formats cannot hold is an error before anything is meshed.
       keep: "box": what lies in the oracle's bounding box, cut at its sides where the manifold leaves
@@ -145,8 +145,8 @@ def mesh(
       scale: (d,) positive lengths, about how far the manifold goes along each axis, where axes have
         different units: M is meshed in the coordinates x / scale. `epsilon`, all other lengths and the
         report's are of these, sizes and angles, too; the oracle is asked, and points, places and
-        seeds are, in its own coordinates. What is meshed is oracles.in_units(oracle, scale), which says of
-        which oracles there is one: workers that join have to serve that, and a server shows it.
+        seeds are, in its own coordinates. What is meshed is oracles.in_units(oracle, scale), which names
+        the oracles that have one: workers that join have to serve that, and a server shows it.
       keep_on_server: a finished mesh stays on `server`, as the mesh's `name`, for stellate.download and
         viewers, until somebody deletes it or the server's `keep-finished-seconds`, an hour by default,
         are over, or its `keep-finished-meshes` newer ones are there.
@@ -250,7 +250,7 @@ def watch(
     scale: Any = None,
     **options: Unpack[MeshOptions],
 ) -> Iterator[Mesh]:
-    """The mesh as it grows: an iterator over Mesh, the last of which is a FinishedMesh.
+    """The mesh as it grows: an iterator over Mesh; the last is a FinishedMesh.
 
     With an oracle, everything is as in stellate.mesh; closing the iterator cancels the mesh. With
     the name of a mesh in place of the oracle, a mesh that others made and serve is watched, from
@@ -429,13 +429,13 @@ def serve(
     All workers of a mesh have to answer for the same manifold. Ctrl-C takes this worker away; its
     work goes to the others.
 
-    A worker that comes when the mesh is over returns its state at once, so a late batch job is a
-    success. `worker` is its name, for logs; `max_chunk` the most points that the oracle is asked at
-    once, as in stellate.mesh.
+    A worker that comes when the mesh is over returns its state immediately, so a late batch job is a
+    success. `worker` is its name, for logs; `max_chunk` the most points that one call of the oracle
+    gets, as in stellate.mesh.
 
     Returns: the state that the mesh ended in, e.g. "SUCCEEDED".
     Raises: MeshNotFound, also for a mesh that was over and is no longer kept; what the oracle
-        raises, after the server was told, or a StellateError.
+        raises, after the server has it, too, or a StellateError.
     """
     with _client(server, credentials) as client, told("this worker left; others have its work"):
         return client.serve(oracle, mesh_name, worker=worker, max_chunk=max_chunk)

@@ -154,7 +154,7 @@ class Checkpoint:
         self._replace(self._record_path, lambda file: file.write(text.encode()))
 
     def forget(self) -> None:
-        """The next call begins anew."""
+        """The next call begins from the start."""
         os.remove(self._record_path)
         self._record = {}
 

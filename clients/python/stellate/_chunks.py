@@ -42,7 +42,7 @@ class Declared:
         about: Any = "",
         **can: bool,
     ) -> None:
-        """`ask` answers chunks; None: nobody calls a method."""
+        """`ask` answers chunks; None: no method is called."""
         self.dimension, self.ambient_dimension = dimension, ambient_dimension
         self.bounding_box, self.seeds, self.walls = bounding_box, seeds, walls
         self.about = about

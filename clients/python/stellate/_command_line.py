@@ -132,7 +132,7 @@ def _say_nothing(progress: Progress) -> None:
 
 
 def _deliver(finished: Complex | SavedMesh, options: argparse.Namespace) -> int:
-    """What a mesh is told by; the exit status that stands for it."""
+    """What is printed of a mesh; the exit status that stands for it."""
     report = finished.report
     if options.report is not None and report is not None:
         pathlib.Path(options.report).write_text(report.to_json() + "\n")

@@ -28,7 +28,7 @@ class CommandOracle:
 
     Args:
       command: for /bin/sh -c.
-      processes: of it, each with a batch of its own; so many threads may ask at once.
+      processes: of it, each with a batch of its own; so many threads may ask at a time.
       dimension, ambient_dimension: k and d; where the command says them too, they have to be the
         same.
       bounding_box, seeds: (lower (d,), upper (d,)); (m, d). Instead of the command's own.
@@ -295,7 +295,7 @@ class CommandOracle:
                 if isinstance(failure, Exception):
                     self._failed = self._failed or failure
                     failure = self._failed
-                else:  # Ctrl-C in the midst of a batch: nobody knows where in its answer it is
+                else:  # Ctrl-C in the midst of a batch: it is unknown where in its answer it is
                     self._failed = self._failed or OracleError("it was interrupted", _REASON)
                 self._wake.notify_all()
             mine[0].end()
@@ -371,7 +371,7 @@ class _Speaker:
         return self._guarded(f"in a batch of {len(question.points)} {kind}", act)
 
     def end(self) -> None:
-        self._process.end(at_once=True)
+        self._process.end(hurry=True)
         self._running.discard(self._process)
 
     def ended_well(self) -> bool:

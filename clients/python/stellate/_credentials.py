@@ -22,7 +22,7 @@ class Credentials:
 
     stellate.Client, serve, watch and download take them likewise. Nothing is read or sent before that:
     files that are missing, a certificate without its key, and a token that would go over the network
-    in plain text are told when the server is called (FileNotFoundError, stellate.InvalidArgument). The
+    in plain text are found when the server is called (FileNotFoundError, stellate.InvalidArgument). The
     token is not shown by repr().
 
     Args:

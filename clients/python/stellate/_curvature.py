@@ -1,7 +1,7 @@
 """How a mesh bends: its second fundamental form, in any codimension.
 
-There are three sources, the best of which is taken. An oracle with a `jacobian` has equations f = 0, of
-which the form is -J^+ D^2 f, along M. Any other oracle has closest points: the second derivative of
+There are three sources; the best one is taken. An oracle with a `jacobian` has equations f = 0, and
+the form is -J^+ D^2 f, along M. Any other oracle has closest points: the second derivative of
 t -> closest_point(x + t u) at 0, across M, is the form's value II(u, u). Without an oracle a polynomial
 of degree three is fitted to the points near by (F. Cazals and M. Pouget, "Estimating differential
 quantities using polynomial fitting of osculating jets", 2005), whose second derivatives are right to
@@ -36,7 +36,7 @@ class Curvature:
       tangents: (n, d, k): orthonormal columns that span the tangent space at each point.
       second: (n, k, k, d): the second fundamental form in that basis. II(u, v) is the part across M of
         how v turns along u: a vector normal to M, towards the side that M bends to.
-      normals: (n, d), of hypersurfaces whose sides can be told: outwards where closed; else None.
+      normals: (n, d), of hypersurfaces whose sides are known: outwards where closed; else None.
     """
 
     tangents: np.ndarray
@@ -48,7 +48,7 @@ class Curvature:
         """(n, k), ascending in each row: of a hypersurface, against its normals.
 
         Positive where it bends away from its normal: those of a sphere of radius r are 1 / r.
-        Raises: InvalidArgument in other codimensions, and where sides cannot be told.
+        Raises: InvalidArgument in other codimensions, and where sides are not known.
         """
         if self.normals is None:
             raise InvalidArgument(

@@ -43,7 +43,7 @@ def with_derivatives(f: Callable[[Any], Any], library: Library) -> tuple[Batched
 
 
 class _Derived:
-    """What a library makes of f; another process has it made anew."""
+    """What a library makes of f; another process has it made again."""
 
     def __init__(self, f: Callable[[Any], Any], library: Library) -> None:
         self._made_of = f, library

@@ -121,7 +121,7 @@ def assemble(client: Client, info: MeshInfo, revision: int, on_part: OnPart | No
     points, rows = [np.empty((0, d))], [np.empty((0, width), dtype=np.uint32)]
     boundary: list[tuple[np.ndarray, np.ndarray]] = []
     turned: list[np.ndarray] = []  # (m,) bool, of the rows
-    orientable: bool | None = True  # None: not told of all
+    orientable: bool | None = True  # None: not known of all
     labels: list[tuple[np.ndarray, np.ndarray]] = []
     codes: list[np.ndarray] = []  # of the points
     smoothed: list[np.ndarray] = []
@@ -191,7 +191,7 @@ def assemble(client: Client, info: MeshInfo, revision: int, on_part: OnPart | No
 
 
 def _places(codes: list[np.ndarray], vertices: int) -> np.ndarray | None:
-    """Their names; None where they are not told of all."""
+    """Their names; None where they are not known of all."""
     if not codes or sum(map(len, codes)) != vertices:
         return None
     found, which = np.unique(np.concatenate(codes), return_inverse=True)

@@ -23,7 +23,7 @@ def choose(
 ) -> tuple[float, str]:
     """epsilon as it is and "", or for "auto" what the server says after check(oracle), and why.
 
-    `tell` is told before the oracle is asked, which may take a slow one long.
+    `tell` is called before the oracle is asked, which may take a slow one long.
 
     Raises: OracleError with what check() found where the oracle breaks its contract.
     """

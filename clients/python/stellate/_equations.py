@@ -1,4 +1,4 @@
-"""Equations F(x) = 0, F: R^d -> R^m, solved for whole batches of points at once.
+"""Equations F(x) = 0, F: R^d -> R^m, solved for whole batches of points.
 
 Each point's course is its own: how a batch is cut never changes an answer, not even by a rounding
 error.

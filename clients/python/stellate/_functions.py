@@ -79,7 +79,7 @@ class UserFunction:
     def _called(self, shape: tuple[int, ...]) -> str:
         one = f" or {_shape('n', *self.row[:-1])}" if self.row[-1:] == (1,) else ""
         return (
-            f"{self.name} is called with a whole batch at once, an array (n, {self._asked}), here "
+            f"{self.name} is called with a whole batch, an array (n, {self._asked}), here "
             f"{shape}, and returns {_shape('n', *self.row)}{one}, a row for each of its rows: "
             f"x[:, 0] are all first coordinates, x[0] is the first point{self._why}"
         )

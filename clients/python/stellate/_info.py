@@ -32,7 +32,7 @@ class MeshInfo:
     report: Report | None  # once it is over
     workers: int
     watchers: int
-    owner: str = ""  # told to administrators of the server alone
+    owner: str = ""  # known to administrators of the server alone
     boundary_only: bool = False  # its simplices are those of the boundary, each with two labels
     region_names: tuple[str, ...] = ()  # of the labels 1, 2, ...; "": none
 
@@ -83,7 +83,7 @@ class ServerInfo:
     max_rounds: int
     max_meshes: int
     max_message_bytes: int
-    owner_meshes: int  # of one owner at once, where the server tells owners apart
+    owner_meshes: int  # of one owner at a time, where the server tells owners apart
     max_memory_bytes: int  # of all meshes, as the server estimates it
     owner_memory_bytes: int  # of one owner's meshes
     max_workers: int  # of one mesh

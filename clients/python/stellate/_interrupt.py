@@ -1,4 +1,4 @@
-"""Ctrl-C: asked for once, it ends work in good order; a second time, at once."""
+"""Ctrl-C: asked for once, it ends work in good order; a second time, immediately."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import contextlib
 import signal
 import threading
 from collections.abc import Iterator
-from types import FrameType, TracebackType
+from types import FrameType
 from typing import Callable
 
 from .errors import Interrupted
@@ -36,18 +36,13 @@ class Interrupts:
             self._ours = True
         return self
 
-    def __exit__(
-        self,
-        kind: type[BaseException] | None,
-        error: BaseException | None,
-        trace: TracebackType | None,
-    ) -> None:
+    def __exit__(self, kind: type[BaseException] | None, *raised: object) -> None:
         self._depth -= 1
         if self._ours and not self._depth:
             signal.signal(signal.SIGINT, signal.default_int_handler)
             self._ours = False
         if kind is KeyboardInterrupt:
-            raise Interrupted("ended at once") from None
+            raise Interrupted("ended immediately") from None
 
     def _take(self, number: int, frame: FrameType | None) -> None:
         if self.asked or self.on_first is None:

@@ -14,7 +14,7 @@ from .errors import InvalidArgument
 _PLAIN = "#6f9fc8"
 _SIZE_INCHES = 4.8
 _LIGHT = np.array([0.35, -0.45, 0.82]) / np.linalg.norm([0.35, -0.45, 0.82])
-_FEW_TRIANGLES = 3000  # of which the edges can be told apart
+_FEW_TRIANGLES = 3000  # whose edges can be seen
 
 
 def plot(

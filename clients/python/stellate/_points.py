@@ -122,7 +122,7 @@ def _array(values: Any, name: str, axes: int, shape: str) -> np.ndarray:
 
 
 def _odd_row(values: Any, axes: int) -> str:
-    """Which row of a list is unlike the first, where that can be told."""
+    """Which row of a list is unlike the first, where that is known."""
     if axes != 2 or not isinstance(values, (list, tuple)):
         return ""
     try:

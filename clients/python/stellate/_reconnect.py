@@ -35,7 +35,7 @@ def is_transient(error: grpc.RpcError) -> bool:
 def pauses(rng: random.Random | None = None) -> Iterator[float]:
     """Seconds between attempts, longer each time up to a limit, each shortened at random.
 
-    So the clients of a server that comes back do not all come at once.
+    So the clients of a server that comes back do not come all together.
     """
     rng = rng or random.Random()
     full = WAITS["first_pause"]
@@ -57,7 +57,7 @@ class ReconnectPolicy:
 class Reconnector:
     """The attempts at one call or stream. One thread makes them; any other may call stop().
 
-    A server is lost with a warning in the log and back with another; `quiet` streams, of which there
+    A server is lost with a warning in the log and back with another; `quiet` streams, as there
     are several next to one that is not, leave that to it.
     """
 
@@ -133,5 +133,5 @@ class Reconnector:
         if self._stopped.wait(min(next(self._pauses), left)):
             raise as_ours from None
         # Connections come about only while somebody waits for them, and a stream that finds none
-        # fails at once.
+        # fails immediately.
         self._policy.connect()

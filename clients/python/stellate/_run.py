@@ -42,7 +42,7 @@ Choice = Callable[
     [Any, Epsilon, Callable[[Any], CheckReport], Callable[[str], None]], "tuple[float, str]"
 ]
 
-_FAREWELL_SECONDS = 2.0  # that an oracle may take to come to an end when nobody waits for it
+_FAREWELL_SECONDS = 2.0  # that an oracle may take to come to an end when no call waits for it
 
 
 class _Workers:
@@ -58,7 +58,7 @@ class _Workers:
         on_failure: Callable[[BaseException], None],
         ask: Ask,
     ) -> None:
-        """`on_failure` is told of each; what it raises in turn, the server is not told."""
+        """`on_failure` is called with each; what it raises in turn stays here."""
         self.failure: BaseException | None = None
         self._on_failure = on_failure
         self._workers = [
@@ -230,7 +230,7 @@ class Run:
         return Following(client, info, self._on_progress, every)
 
     def _say(self, choice: tuple[float, str]) -> float:
-        """Tells of an epsilon that was chosen, with a reason, and returns it."""
+        """Reports an epsilon that was chosen, with a reason, and returns it."""
         epsilon, self._epsilon_reason = choice
         if self._epsilon_reason:
             _note(self._on_progress, f"epsilon {epsilon:g}, {self._epsilon_reason}")
@@ -276,7 +276,7 @@ class Run:
     def __iter__(self) -> Iterator[Mesh | SavedMesh]:
         """The mesh as it grows, the last with its report. Raises how it failed.
 
-        Where epsilon was to be chosen and was too coarse, a finer mesh begins anew.
+        Where epsilon was to be chosen and was too coarse, a finer mesh begins from the start.
         """
         if self._kept is not None:
             yield self._kept
@@ -454,12 +454,12 @@ class Run:
         trace: TracebackType | None,
     ) -> None:
         second = self._interrupted and isinstance(error, KeyboardInterrupt)
-        at_once = second and not isinstance(error, Interrupted)
+        kill = second and not isinstance(error, Interrupted)
         try:
-            if self._live is not None and not at_once:
+            if self._live is not None and not kill:
                 self._leave(self._live)
         finally:
-            self._close_connection(at_once)
+            self._close_connection(kill)
             if self._checkpoint is not None and (self._ended or self._kept is not None):
                 self._checkpoint.forget_server()
             close = getattr(self._on_progress, "close", None)
@@ -479,11 +479,11 @@ class Run:
             except StellateError:
                 pass  # it ends with its server, or somebody else was first
 
-    def _close_connection(self, at_once: bool = False) -> None:
+    def _close_connection(self, kill: bool = False) -> None:
         if self._own_client is not None:
             self._own_client.close()
         if self._server is not None:
-            self._server.close(at_once=at_once)
+            self._server.close(kill=kill)
 
 
 def _check(oracle: Any, server: str | Server | Client | None) -> CheckReport:

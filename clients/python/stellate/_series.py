@@ -18,7 +18,7 @@ def save_series(meshes: Iterable[Mesh], path: str | os.PathLike[str], every: int
         mesh = stellate.save_series(stellate.watch(oracle, epsilon=0.1), "torus.pvd")
 
     The .pvd file lists what is there at any time, so it can be opened while the mesh grows, and
-    opened anew. Its time is the revision.
+    opened again. Its time is the revision.
 
     Args:
       meshes: what stellate.watch gives; or any others, which are numbered where they have no

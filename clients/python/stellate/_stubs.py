@@ -108,7 +108,7 @@ def ensure() -> None:
     if _is_current(fingerprint):
         return
     _GENERATED.mkdir(exist_ok=True)
-    with open(_GENERATED / ".lock", "w") as lock:  # several processes may import at once
+    with open(_GENERATED / ".lock", "w") as lock:  # several processes may import at a time
         fcntl.flock(lock, fcntl.LOCK_EX)
         if not _is_current(fingerprint):
             _generate(sources, fingerprint)

@@ -189,7 +189,7 @@ class Worker:
         ask: Ask = answer,
         max_chunk: int | None = None,
     ) -> None:
-        """`on_failure` is told what the oracle raised before the server is. `quiet`: no log.
+        """`on_failure` gets what the oracle raised before the server does. `quiet`: no log.
 
         `max_chunk`: the most queries in one call of the oracle; None: the server decides.
         `ask` has the oracle answer a chunk, somewhere. Its ExecutorError ends this worker alone.
@@ -211,7 +211,7 @@ class Worker:
     def run(self) -> str:
         """Serves; returns the state the mesh ended in, "" when stopped before.
 
-        Raises: what the oracle raised, after the server was told, or a StellateError.
+        Raises: what the oracle raised, after the server has it, too, or a StellateError.
         """
         while True:
             try:

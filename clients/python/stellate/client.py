@@ -51,7 +51,7 @@ class Client:
       reconnect_seconds: how long a server that was there and went away is waited for; 0: not at
         all. Calls are repeated where that does no harm, and streams carried on where they broke
         off. It has to remember its meshes (stellated --data-dir). A server that cannot be reached
-        in the first place, or refuses, is an error at once. The logger "stellate" tells of it.
+        in the first place, or refuses, is an error immediately. The logger "stellate" reports it.
       keepalive_seconds: how long a silent server is trusted before it is pinged; it has twice as
         long to answer.
     """
@@ -78,7 +78,7 @@ class Client:
                 f"server has to be 'host:port' or 'unix:/path', and is {address!r}"
             )
         self.address = address
-        # A private server needs no pings: its end shows at once.
+        # A private server needs no pings: its end shows immediately.
         private = isinstance(self._server, Server) and self._server.private
         ping = max(1, int(1000 * (_NO_PINGS if private else keepalive_seconds)))
         lost = int(WAITS["ping_patience"] * ping)
@@ -201,7 +201,7 @@ class Client:
         ask: Ask = answer,
         max_chunk: int | None = None,
     ) -> Worker:
-        """A worker for a thread of its own; `on_failure` is told of an exception of the oracle.
+        """A worker for a thread of its own; `on_failure` is called with an exception of the oracle.
 
         A `quiet` one leaves it to others to log that the server is lost. `ask` has the oracle
         answer a chunk of questions, somewhere else perhaps: see stellate.executors.workers_on.
@@ -264,7 +264,7 @@ class Client:
             pass  # what is wrong the next attempt will tell
 
     def _why_hopeless(self) -> StellateError | None:
-        """The end of our own server, which nobody will start again."""
+        """The end of our own server, which will not be started again."""
         if isinstance(self._server, Server) and not self._server.alive:
             return self._server.why_gone()
         return None

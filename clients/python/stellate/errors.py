@@ -98,7 +98,7 @@ class Interrupted(KeyboardInterrupt):
 
     Attributes:
       mesh: what there is of the mesh; None if there is none, or at a second Ctrl-C, which ends
-        everything at once.
+        everything in one batch.
     """
 
     def __init__(self, message: str, mesh: Complex | None = None) -> None:
@@ -149,7 +149,7 @@ class SaveError(StellateError, ValueError):
 
 
 class NotCertified(StellateError):
-    """The mesh is finished and not proved good, which stellate.mesh was told to insist on.
+    """The mesh is finished and not proved good, as stellate.mesh(require_certified=True) demands.
 
     The mesh is the exception's `mesh`, and its report says what is wrong.
     """
@@ -164,7 +164,7 @@ class UncertifiedWarning(UserWarning):
 class NotConverged(StellateError, ArithmeticError):
     """Closest points that were not found for some of a batch.
 
-    An oracle may raise it: the points that did converge are used, and the server is told that there
+    An oracle may raise it: the points that did converge are used, and the server learns that there
     is none for the others.
 
     Attributes:
@@ -280,9 +280,9 @@ def _advice(code: grpc.StatusCode, message: str) -> str:
 
 def add_words(error: Exception, words: str) -> None:
     """To the message of somebody else's exception, once; its type stays."""
-    if getattr(error, "_stellate_told", False):
+    if getattr(error, "_stellate_words", False):
         return
-    error._stellate_told = True  # type: ignore[attr-defined]
+    error._stellate_words = True  # type: ignore[attr-defined]
     if len(error.args) == 1 and isinstance(error.args[0], str) and str(error) == error.args[0]:
         error.args = (f"{error.args[0]}; {words}",)
     elif hasattr(error, "add_note"):

@@ -295,12 +295,12 @@ def workers_on(
             workers = stellate.executors.workers_on(pool, oracle, mesh.name, 32, server=server)
             states = workers.wait()
 
-    Returns at once. Each slot is a stream to the server, which hands every chunk of questions that
+    Returns immediately. Each slot is a stream to the server, which hands every chunk of questions that
     comes to `executor.submit`; a slot for each of the executor's workers keeps all of them busy.
     The oracle and its answers are pickled. A process of the executor makes its oracle once and
     keeps it; one that is not `thread_safe` is called by one thread of a process at a time.
 
-    What the oracle raises there is raised by wait(), and told to the server. What the executor
+    What the oracle raises there is raised by wait(), and reported to the server. What the executor
     loses, because a machine or a process of it died, is submitted again, up to three times.
 
     Args:

@@ -29,7 +29,7 @@ class Reconstructor:
     Args are those of stellate.reconstruct. It goes into sklearn.base.clone and searches of parameters;
     scikit-learn itself is not needed.
 
-    After `fit` it has `mesh_`, a FinishedMesh, of which row i of `points` is row i of X; `places_`, (n,) str,
+    After `fit` it has `mesh_`, a FinishedMesh; row i of its `points` is row i of X; `places_`, (n,) str,
     what became of each point; and `n_features_in_`, which is d.
     """
 

@@ -41,10 +41,10 @@ class Oracle(Protocol):
         tangent_basis, and
       face_point(points (n, d), face) -> (n, d): nearest points of M^ where the walls of `face`, a
         tuple of their numbers, ascending, are zero. May raise NotConverged.
-      clearances(points (n, d)) -> (n, walls): the g_i, of which the sign counts.
+      clearances(points (n, d)) -> (n, walls): the g_i; their signs count.
       conormals(points (n, d), face) -> (n, len(face), d): at points of a face, the outward unit normal
         of each of its walls within the tangent space. stellate.oracles.Clipped has all of these.
-      labels: (2^walls,) whole numbers from -1 to 127, for walls of which M is not all that is positive:
+      labels: (2^walls,) whole numbers from -1 to 127, for walls where M is not all that is positive:
         unions, differences, several materials. Entry s is the label of the points where wall i is
         positive if bit i of s is set, and else negative. M is where the label is not 0; its regions,
         one for each label, are meshed together, and mesh.labels says which simplex is in which. -1
@@ -63,7 +63,7 @@ class Oracle(Protocol):
       bounding_box: (lower (d,), upper (d,)), where to look for M, or
       seeds: (m, d), points near M, one at least on each component. One of the two is needed.
       in_units(scale (d,)) -> oracle: of {x / scale : x in M}, for stellate.mesh(..., scale=).
-      thread_safe: True lets several workers call it at once.
+      thread_safe: True lets several workers call it at the same time.
       about: a str, one sentence that it says of itself, for people, such as what it was fitted with:
         the verdict ends with its first 300 characters, as the oracle's own words.
     """

@@ -132,7 +132,7 @@ class Patience:
 
 
 def somebody_looks_on(file: TextIO | None) -> bool:
-    """Whether a person sees at once what the program writes there: on a terminal, or in a notebook.
+    """Whether a person sees immediately what the program writes there: on a terminal, or in a notebook.
 
     Threads and processes beside the main ones leave it to that to speak.
     """

@@ -319,7 +319,7 @@ class Report:
     epsilon: float | None = None  # that the mesh was made with; None if that is not known
     epsilon_reason: str = ""  # why it is what it is, where it was not given
     text: str = (
-        ""  # all of it in several lines, for people, but for epsilon; each line with its "\n"
+        ""  # all of it in several lines, for people, except epsilon; each line with its "\n"
     )
     reconstruction: ReconstructionReport | None = None  # of a mesh of points, else None
     finer: FinerEpsilon | None = None  # where this epsilon was too coarse for a certificate

@@ -21,9 +21,9 @@ _READY_SECONDS = 30.0
 _STOP_SECONDS = 10.0
 _LONGEST_SOCKET_PATH = 100  # the kernel takes 107 bytes
 BUNDLED = pathlib.Path(__file__).resolve().parent / "_bundled" / "stellated"  # packaging/wheel's
-# When its client goes there is nobody left to finish a mesh for.
+# When its client goes no client is left to finish a mesh for.
 _OWN_FLAGS = ("--drain-seconds", "0")
-# Over a unix socket the end of a client shows at once. One that answers no pings is merely busy in
+# Over a unix socket the end of a client shows immediately. One that answers no pings is merely busy in
 # an oracle that does not let go of the interpreter.
 _PRIVATE_FLAGS = ("--keepalive", "600", "--keepalive-timeout", "600")
 
@@ -59,7 +59,7 @@ def find_stellated() -> str:
 
 
 def _machines_name() -> str:
-    """This machine's name, or, where that is known to nobody, its address on the way out."""
+    """This machine's name, or, where no name server knows that, its address on the way out."""
     name = socket.gethostname()
     try:
         socket.getaddrinfo(name, None)
@@ -114,8 +114,8 @@ class Server:
           token_file: lines "OWNER TOKEN"; clients must send one of the tokens.
           tls_cert, tls_key: PEM files; the certificate has to bear the name in `address`.
           tls_client_ca: PEM file; clients must show a certificate of these authorities.
-          insecure_listen: take plain text from other machines, whoever they are: for a network
-            where everybody who can connect may. Without it, and without TLS, such a `listen` is refused.
+          insecure_listen: take plain text from any other machine: for a network
+            where all that can connect may. Without it, and without TLS, such a `listen` is refused.
 
         Raises: ServerNotFound; Unavailable with the server's words if it does not start.
         """
@@ -207,13 +207,13 @@ class Server:
             "SERVER_GONE",
         )
 
-    def close(self, *, at_once: bool = False) -> None:
+    def close(self, *, kill: bool = False) -> None:
         """Stops the server and removes its directory. May be called again.
 
-        `at_once` does not ask it to stop, and kills it; what it has recorded stays.
+        `kill`: without asking it to stop; what it has recorded stays.
         """
         try:
-            if self._process is not None and self._keeper.is_alive() and not at_once:
+            if self._process is not None and self._keeper.is_alive() and not kill:
                 self._process.send_signal(signal.SIGTERM)
                 self._keeper.join(_STOP_SECONDS)
         finally:  # also when that was interrupted

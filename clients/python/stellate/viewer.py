@@ -106,7 +106,7 @@ def _status(mesh: Mesh, label: str) -> pb.Mesh:
         status.state = _STATES.get(mesh.report.termination, pb.MESH_STATE_STOPPED)
         status.spec.epsilon = mesh.report.epsilon or mesh.report.certificate.max_circumradius
         status.report.CopyFrom(_report(mesh.report))
-        status.end_time.seconds = 1  # it is over; nobody asks when
+        status.end_time.seconds = 1  # it is over; when does not matter
         counts = mesh.report.counts
         status.progress.queries, status.progress.round = counts.queries, counts.rounds
         status.progress.elapsed_seconds = mesh.report.elapsed_seconds

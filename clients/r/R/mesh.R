@@ -20,18 +20,18 @@ python <- function() reticulate::import("stellate")
 #'     radius, else NA.
 #'   - `local_size`: function of points of the manifold: lengths.
 #'   - `walls`: how many walls bound the manifold, which has a boundary then: it is where all walls
-#'     are at least 0 on a manifold without one, of which the functions above tell; it may be R^d
+#'     are at least 0 on a manifold without one, which the functions above describe; it may be R^d
 #'     itself. Walls take `tangent_basis` and three functions more. `face_point` (points, face):
 #'     as `closest_point`, where the walls of the face, their numbers from one, ascending, are 0,
-#'     whatever the others are. `clearances` (points): n x walls, their values, of which the sign
-#'     counts. `conormals` (points, face): of each wall of the face the unit normal within the
+#'     whatever the others are. `clearances` (points): n x walls, their values, whose signs
+#'     count. `conormals` (points, face): of each wall of the face the unit normal within the
 #'     tangent space along which its value falls, n x length(face) x d.
 #'
 #'   and more keywords of Python's `stellate.pulling.pull`: size_rate, max_vertices, credentials...
 #' @param server "host:port"; by default a server is started.
 #' @param checkpoint a directory, made if it is not there, in which the mesh outlives this R: the
 #'   same call goes on from where the last one was interrupted or killed, or its oracle stopped,
-#'   and gives a mesh that is finished at once.
+#'   and gives a mesh that is finished immediately.
 #' @param on_progress function of the progress, called on R's thread.
 #' @return list of class "stellate_mesh": `points` (n x d), `simplices` (m x (k+1), counted from
 #'   one), `walls` (n x walls, whether a point lies on a wall; NULL without a boundary),

@@ -23,7 +23,7 @@ oracle_of <- function(closest_point, dimension, given) {
   oracle
 }
 
-# What Python is told of it.
+# What Python gets of it.
 abilities <- function(oracle) {
   has <- function(name) !is.null(oracle[[name]])
   list(
@@ -33,7 +33,7 @@ abilities <- function(oracle) {
 }
 
 # Answers chunks until there are no more. A row of NA in an answer says that its point has none.
-# `fails` is called with what the oracle stops with, after Python was told.
+# `fails` is called with what the oracle stops with, after Python has it, too.
 answer_all <- function(worker, oracle, each = function() NULL, fails = stop) {
   repeat {
     chunk <- reticulate::iter_next(worker)

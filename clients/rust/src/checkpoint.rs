@@ -143,7 +143,7 @@ impl Checkpoint<'_> {
         Ok(info)
     }
 
-    /// Has the next call begin anew where this mesh has failed for good.
+    /// Has the next call begin from the start where this mesh has failed for good.
     pub fn forget_after(&self, error: &Error) {
         let over = error.mesh.as_ref().is_some_and(|mesh| mesh.report.is_some());
         if over && !error.reason.starts_with("JOURNAL_") {

@@ -39,7 +39,7 @@ pub struct ClientOptions {
     pub reconnect: Duration,
     /// How long a silent server is trusted before it is pinged; twice as long to answer.
     pub keepalive: Duration,
-    /// Told when the server is lost and when it is back.
+    /// Called when the server is lost and when it is back.
     pub on_outage: Box<dyn Fn(&str) + Send + Sync>,
 }
 
@@ -93,7 +93,7 @@ impl Client {
             .initial_stream_window_size(STREAM_WINDOW)
             .initial_connection_window_size(2 * STREAM_WINDOW);
         if !own.is_some_and(|server| server.private) {
-            // A private server needs no pings: its end shows at once.
+            // A private server needs no pings: its end shows immediately.
             endpoint = endpoint
                 .http2_keep_alive_interval(options.keepalive)
                 .keep_alive_timeout(options.keepalive.mul_f64(reconnect::PING_PATIENCE))

@@ -9,7 +9,7 @@ use crate::Mesh;
 const UNSETTLED: usize = 300_000; // vertex numbers of removed simplices at least; else half of those there
 
 /// Vertices and simplices as of the last complete revision. What comes and goes is put aside, and
-/// settled for many revisions at once. An error is a delta that does not fit what came before.
+/// settled for many revisions together. An error is a delta that does not fit what came before.
 #[derive(Debug)]
 pub struct GrowingComplex {
     k: usize,
@@ -21,7 +21,7 @@ pub struct GrowingComplex {
     added: Vec<u32>,
     removed: Vec<u32>,
     pending: Vec<MeshDelta>,
-    turned: Option<Vec<u8>>, // of the last revision; None: not told
+    turned: Option<Vec<u8>>, // of the last revision; None: not known
     turned_rows: Vec<u32>,   // of a download
     untold: bool,            // a part of the download was not oriented
     places: Vec<String>,     // of a download of a reconstruction

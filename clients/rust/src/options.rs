@@ -17,7 +17,7 @@ pub enum Connection<'a> {
     Server(&'a str, ClientOptions),
 }
 
-/// Told how a mesh stands.
+/// Called with how a mesh stands.
 pub type OnProgress<'a> = Box<dyn FnMut(&Progress) + 'a>;
 
 /// Cancels meshes, from any thread: `RunOptions::cancel`.
@@ -45,7 +45,7 @@ pub struct RunOptions<'a> {
     pub require_certified: bool,
     /// A directory, made if it is not there, in which the mesh outlives this program: the same call goes
     /// on from where the last one was cancelled or killed, or its oracle failed, and gives a mesh that is
-    /// finished at once. For `Connection::Own`; other servers keep their meshes with --data-dir.
+    /// finished immediately. For `Connection::Own`; other servers keep their meshes with --data-dir.
     pub checkpoint: Option<PathBuf>,
     /// Called on this thread.
     pub on_progress: Option<OnProgress<'a>>,

@@ -38,7 +38,7 @@ pub trait Oracle: Sync {
         None
     }
 
-    /// Whether several workers may call it at once.
+    /// Whether several workers may call it at the same time.
     fn concurrent(&self) -> bool {
         false
     }
@@ -76,7 +76,7 @@ pub trait Oracle: Sync {
     }
 
     /// How many walls bound M, which has a boundary then: it is where all walls are at least 0 on M^, a
-    /// manifold without one, of which the methods above tell; it may be R^d itself. Walls take
+    /// manifold without one, which the methods above describe; it may be R^d itself. Walls take
     /// `tangent_basis` and the three methods below.
     fn walls(&self) -> usize {
         0
@@ -94,7 +94,7 @@ pub trait Oracle: Sync {
         Err("face_point is not overridden, and there are walls".into())
     }
 
-    /// The walls' values at points `[n, d]`, of which the sign counts: `[n, walls]`.
+    /// The walls' values at points `[n, d]`, whose signs count: `[n, walls]`.
     fn clearances(&self, _points: &[f64], _values: &mut [f64]) -> Result<(), BoxError> {
         Err("clearances is not overridden, and there are walls".into())
     }

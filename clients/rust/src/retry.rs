@@ -54,7 +54,7 @@ impl Flag {
     }
 }
 
-/// The attempts at one call or stream. A quiet one leaves it to others to tell of an outage.
+/// The attempts at one call or stream. A quiet one leaves it to others to report an outage.
 pub struct Outage<'a> {
     patience: &'a Patience,
     quiet: bool,
@@ -129,7 +129,7 @@ impl<'a> Outage<'a> {
         let longer = reconnect::PAUSE_GROWTH.powf(f64::from(self.attempts));
         let full = Duration::from_secs_f64((reconnect::FIRST_PAUSE * longer).min(reconnect::LONGEST_PAUSE));
         self.attempts += 1;
-        // Shortened at random: the clients of a server that comes back do not all come at once.
+        // Shortened at random: the clients of a server that comes back do not come all together.
         let chance = RandomState::new().build_hasher().finish() as f64 / u64::MAX as f64;
         let pause = full.mul_f64(1.0 - reconnect::PAUSE_JITTER * chance).min(most - gone);
         tokio::select! {

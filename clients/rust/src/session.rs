@@ -288,7 +288,7 @@ fn session(
                 let serve = AssertUnwindSafe(|| client.runtime.block_on(worker.run()));
                 let outcome = catch_unwind(serve).unwrap_or_else(|payload| {
                     panicked.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(payload);
-                    left.set(); // nobody else would answer
+                    left.set(); // no other worker would answer
                     Ok(String::new())
                 });
                 // What the server refuses, or its absence, the watch reports.

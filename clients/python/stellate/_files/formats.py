@@ -248,8 +248,8 @@ class _Format:
         return mesh.points, every
 
     def grouped(self, every: list[Group], k: int) -> list[Group] | None:
-        """Those of all groups that it holds; None where it is not known on what walls a solid ends, of
-        which it holds the boundary alone."""
+        """Those of all groups that it holds; None where it is not known on what walls a solid ends, and it
+        holds the boundary alone."""
         if self.holds is Holds.GROUPS:
             return every
         if len(every) == 1:

@@ -58,7 +58,7 @@ class Process:
         while not done:
             read, written = self._wait(bool(left), deadline)
             moved = False
-            if read:  # first: who closes its input may have answered all the same
+            if read:  # first: who closes its input may have answered nevertheless
                 moved = self._read(_standing(question, len(left)))
                 done = moved and take(self.unread)
             if written and not done:
@@ -132,14 +132,14 @@ class Process:
         with contextlib.suppress(OSError):
             self._input.close()
 
-    def end(self, at_once: bool = False) -> None:
+    def end(self, hurry: bool = False) -> None:
         """Ends it and all that it started. In order: its input ends, and it has two seconds to do so
-        too. Then, or at once: SIGTERM, and what is left of it after two seconds more, SIGKILL."""
+        too. Then, or immediately: SIGTERM, and what is left of it after two seconds more, SIGKILL."""
         if self._over:
             return
         self._over = True
         self.dismiss()
-        if at_once or not self._await_end(_GRACE, of_all=True):
+        if hurry or not self._await_end(_GRACE, of_all=True):
             self._signal(signal.SIGTERM)
             self._await_end(_GRACE, of_all=True)
         self._signal(signal.SIGKILL)
@@ -179,7 +179,7 @@ class Process:
             time.sleep(0.002)
 
     def _look(self) -> None:
-        """It is not collected before all are ended: its group's number is nobody else's until then."""
+        """It is not collected before all are ended: its group's number has no other owner until then."""
         seen = os.waitid(os.P_PID, self._process.pid, os.WEXITED | os.WNOHANG | os.WNOWAIT)
         if seen is not None:
             exited = seen.si_code == os.CLD_EXITED

@@ -115,7 +115,7 @@ def spread_labels(
 class DeltaMesh:
     """Vertices and simplices as of the last complete revision.
 
-    What comes and goes is put aside, and settled for many revisions at once.
+    What comes and goes is put aside, and settled for many revisions together.
     """
 
     def __init__(self, dimension: int, ambient_dimension: int, boundary_only: bool = False) -> None:
@@ -134,7 +134,7 @@ class DeltaMesh:
         self._removed: list[np.ndarray] = []
         self._removed_count = 0
         self._pending: list[mesh_pb2.MeshDelta] = []
-        self._orientable: bool | None = None  # None: not told
+        self._orientable: bool | None = None  # None: not known
         self._turned = b""
 
     def absorb(self, chunk: pb.DeltaChunk) -> bool:
@@ -182,8 +182,8 @@ class DeltaMesh:
         self._turned += chunk.turned
 
     def orientation(self) -> Orientation | None:
-        """The orientation of simplices(), once the server has told it. Raises: ValueError if it has not
-        told it of all of them."""
+        """The orientation of simplices(), once the server has sent it. Raises: ValueError if it has not
+        sent it of all of them."""
         self.settle()
         if self._orientable is None:
             return None

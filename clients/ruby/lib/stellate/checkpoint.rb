@@ -29,19 +29,19 @@ module Stellate
       Choice.new(there.epsilon, reason, Integer(retries)) if reason && there
     end
 
-    # The mesh that is there, or a new one; with `anew` a new one in its place.
-    def declare(client, spec, choice, anew:)
+    # The mesh that is there, or a new one; with `again` a new one in its place.
+    def declare(client, spec, choice, again:)
       essence = spec.dup
       essence.label = ''
       name, _, _, there = read
-      if name && !anew && there != essence
+      if name && !again && there != essence
         raise Stellate.invalid("the checkpoint #{folder} is of a mesh of another specification: " \
                                'take another directory, or remove it')
       end
 
       others, found = client.list.partition { |info| info.name != name }
       others.each { |info| client.delete(info.name) } # were forgotten, or never put down
-      return found.first unless anew || found.empty?
+      return found.first unless again || found.empty?
 
       made = client.create_from(spec)
       chosen = choice.reason.empty? ? [] : [choice.retries, choice.reason]
@@ -50,7 +50,7 @@ module Stellate
       made
     end
 
-    # Has the next call begin anew where this mesh has failed for good.
+    # Has the next call begin from the start where this mesh has failed for good.
     def forget_after(error)
       return unless error.is_a?(StellateError) && error.mesh&.report
       return if error.reason.start_with?('JOURNAL_') # with more room it goes on

@@ -47,7 +47,7 @@ module Stellate
 
     # `server`: "host:port", "unix:/path" or a Server. `reconnect_seconds`: how long one that was there and
     # went away is waited for; `keepalive_seconds`: how long a silent one is trusted before it is pinged;
-    # `on_outage` is told when it is lost and when it is back.
+    # `on_outage` is called when it is lost and when it is back.
     def initialize(server, credentials: Credentials.new, reconnect_seconds: RECONNECT[:give_up],
                    keepalive_seconds: RECONNECT[:keepalive], on_outage: ->(said) { warn("stellate: #{said}") })
       own = server.is_a?(Server) ? server : nil

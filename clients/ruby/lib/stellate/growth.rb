@@ -78,7 +78,7 @@ module Stellate
       @walls.update(vertices.zip(walls.to_a).to_h)
     end
 
-    # What goes is put aside, and taken out for many revisions at once.
+    # What goes is put aside, and taken out for many revisions together.
     def change(added, removed)
       @gone.concat(numbered(removed))
       @simplices.concat(numbered(added))
@@ -116,7 +116,7 @@ module Stellate
       @smoothed.concat(Wire.numbers(part.smoothed, part.codes.bytesize, @d)) if part.smoothed
     end
 
-    # The points and simplices of mesh(), as arrays of rows, for when nobody waits for this thread.
+    # The points and simplices of mesh(), as arrays of rows, for when no thread waits for this one.
     def arrays
       @arrays = nil if @arrays_of != @revision
       @arrays_of = @revision

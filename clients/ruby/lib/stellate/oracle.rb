@@ -4,8 +4,8 @@ module Stellate
   # An oracle as the server sees it: answers are checked, with clear words.
   #
   # An oracle is any object with `dimension`, `ambient_dimension`, `bounding_box` ([lower, upper]) or
-  # `seeds` (points near M), and these methods on whole batches, arrays of points, of which the last
-  # three are optional:
+  # `seeds` (points near M), and these methods on whole batches, arrays of points; the last three
+  # are optional:
   #   closest_point(points): a point of M nearest to each; nil where there is none
   #   intersect_flat(centers, bases, radii): the point of M nearest to each center in the flat through it
   #     that is orthogonal to the columns of its basis (d rows of k), within the radius; else nil
@@ -15,10 +15,10 @@ module Stellate
   # The answer to a query must not depend on the rest of its batch. Calls come one at a time.
   #
   # A manifold with boundary has `walls`, their number: it is where all walls are at least 0 on M^, a manifold
-  # without boundary, of which the methods above tell; it may be R^d itself. It needs tangent_basis, and:
+  # without boundary, which the methods above describe; it may be R^d itself. It needs tangent_basis, and:
   #   face_point(points, face): as closest_point, of points of M^ where the walls of the face, their numbers
   #     ascending, are 0, whatever the others are
-  #   clearances(points): at each point the walls' values, of which the sign counts
+  #   clearances(points): at each point the walls' values, whose signs count
   #   conormals(points, face): at points of a face, of each of its walls the unit normal within the tangent
   #     space along which the wall's value falls, one after the other in one array
   class CheckedOracle

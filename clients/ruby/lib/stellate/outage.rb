@@ -6,7 +6,7 @@ module Stellate
   Patience = Struct.new(:give_up_seconds, :connect, :hopeless, :on_outage, :reached)
 
   # The attempts at one call or stream while the server may be away. A quiet one leaves it to others to
-  # tell of it.
+  # report it.
   class Outage
     def initialize(patience, quiet: false)
       @patience, @quiet = patience, quiet
@@ -54,7 +54,7 @@ module Stellate
 
       full = [RECONNECT[:first_pause] * (RECONNECT[:pause_growth]**@attempts), RECONNECT[:longest_pause]].min
       @attempts += 1
-      # Shortened at random: the clients of a server that comes back do not all come at once.
+      # Shortened at random: the clients of a server that comes back do not come all together.
       pause([full * (1 - (rand * RECONNECT[:pause_jitter])), left].min)
       raise ours if stopped?
 

@@ -22,7 +22,7 @@ module Stellate
   class Server
     SAID = /\Astellated listening on /
     STOP_SECONDS = 10
-    # When its client goes there is nobody left to finish a mesh for. One that answers no pings is merely
+    # When its client goes no client is left to finish a mesh for. One that answers no pings is merely
     # busy in an oracle.
     OWN_FLAGS = %w[--drain-seconds 0].freeze
     PRIVATE_FLAGS = %w[--keepalive 600 --keepalive-timeout 600].freeze

@@ -2,7 +2,7 @@
 
 # Meshes: from an oracle, as they grow, or as they are on a server.
 module Stellate
-  FAREWELL_SECONDS = 2 # that a worker may take to end when nobody waits for it
+  FAREWELL_SECONDS = 2 # that a worker may take to end when no call waits for it
 
   class << self
     # Meshes the oracle's manifold. `epsilon` is the largest circumradius of a simplex, a length, or 'auto':
@@ -14,7 +14,7 @@ module Stellate
     #   workers: streams that call the oracle in parallel; max_chunk: most points in one call
     #   checkpoint: a directory, made if it is not there, in which the mesh outlives this program: the same
     #     call goes on from where the last one was interrupted or killed, or its oracle raised, and gives a
-    #     mesh that is finished at once. For a private server; one that is named keeps meshes itself
+    #     mesh that is finished immediately. For a private server; one that is named keeps meshes itself
     #   require_certified: a mesh that is not proved good is NotCertified; save: a file to write
     #   and size_rate, max_deviation, max_vertices, random_seed, label, reach...: see mesh.proto
     # Ctrl-C cancels the mesh, or leaves it to the checkpoint, and is Cancelled with the mesh so far.
@@ -28,7 +28,7 @@ module Stellate
     end
 
     # Yields the mesh as it grows, at every revision; the last one has its report. Where epsilon 'auto' was
-    # too coarse a finer mesh begins anew after that, from nothing. Leaving the block with `break` cancels
+    # too coarse a finer mesh begins after that, from nothing. Leaving the block with `break` cancels
     # the mesh. With a name in place of an oracle a mesh of others is watched.
     def watch(what, epsilon: nil, **options, &each)
       return run(what, epsilon, true, options, &each) unless what.is_a?(String)
@@ -146,7 +146,7 @@ module Stellate
         while choice
           mine[:on_epsilon]&.call(choice.epsilon, choice.reason) unless choice.reason.empty?
           spec = client.spec(oracle, choice.epsilon, options)
-          info = kept ? kept.declare(client, spec, choice, anew: !last.nil?) : client.create_from(spec)
+          info = kept ? kept.declare(client, spec, choice, again: !last.nil?) : client.create_from(spec)
           last = one_mesh(client, oracle, info, every, mine, choice.reason, &each)
           choice = choice.finer(last.report)
         end

@@ -9,7 +9,7 @@ module Stellate
     MESSAGE_BYTES = 4000
     BUSY_SHARE = 0.25 # of the time that the server bears silence
 
-    # Told what the oracle raised; whether the server is to be told as well.
+    # Gets what the oracle raised; returns whether the server gets it as well.
     attr_writer :on_failure
 
     def initialize(client, oracle, mesh, outage, worker: '', max_chunk: nil)

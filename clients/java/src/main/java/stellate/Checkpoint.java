@@ -163,7 +163,7 @@ final class Checkpoint {
     Files.move(draft, record, StandardCopyOption.ATOMIC_MOVE, StandardCopyOption.REPLACE_EXISTING);
   }
 
-  /** Has the next call begin anew where this mesh has failed for good. */
+  /** Has the next call begin from the start where this mesh has failed for good. */
   void forgetAfter(StellateException error) {
     boolean over = error.mesh().flatMap(Mesh::report).isPresent();
     if (!over || error.reason().startsWith("JOURNAL_")) {

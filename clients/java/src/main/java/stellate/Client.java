@@ -60,7 +60,7 @@ public final class Client implements AutoCloseable {
 
   /** To a server of one's own. */
   public Client(Server server) {
-    this(server.address(), Credentials.NONE, 0); // its end shows at once
+    this(server.address(), Credentials.NONE, 0); // its end shows immediately
     patience.hopeless = server::whyGone;
   }
 
@@ -115,7 +115,7 @@ public final class Client implements AutoCloseable {
     return this;
   }
 
-  /** Told when the server is lost and when it is back. Default: standard error. */
+  /** Called when the server is lost and when it is back. Default: standard error. */
   public Client onOutage(Consumer<String> told) {
     patience.onOutage = told;
     return this;

@@ -12,7 +12,7 @@ import stellate.v1.Places;
 
 /**
  * The client's copy of a mesh that grows by deltas: vertices and simplices as of the last complete
- * revision. What comes and goes is put aside, and settled for many revisions at once. A delta that
+ * revision. What comes and goes is put aside, and settled for many revisions together. A delta that
  * does not fit what came before is a StellateException with the reason PROTOCOL.
  */
 public final class Growth {
@@ -29,7 +29,7 @@ public final class Growth {
   private final List<int[]> removed = new ArrayList<>();
   private int removedLength;
   private final List<MeshDelta> pending = new ArrayList<>();
-  private ByteString turned; // the orientation of the last revision; null: not told
+  private ByteString turned; // the orientation of the last revision; null: not known
   private final List<int[]> turnedRows = new ArrayList<>(); // of a download
   private boolean untold; // a part of the download was not oriented
   private final List<String> places = new ArrayList<>(); // of a download of a reconstruction

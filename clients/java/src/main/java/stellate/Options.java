@@ -35,7 +35,7 @@ public final class Options {
   /**
    * A directory, made if it is not there, in which the mesh outlives this program: the same call
    * goes on from where the last one was cancelled or killed, or its oracle threw, and gives a mesh
-   * that is finished at once. For servers that are started; others keep meshes with --data-dir.
+   * that is finished immediately. For servers that are started; others keep meshes with --data-dir.
    */
   public Path checkpoint;
 

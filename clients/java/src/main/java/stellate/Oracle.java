@@ -25,7 +25,7 @@ public interface Oracle {
     return null;
   }
 
-  /** Whether several workers may call it at once. */
+  /** Whether several workers may call it at the same time. */
   default boolean concurrent() {
     return false;
   }
@@ -61,7 +61,7 @@ public interface Oracle {
 
   /**
    * An oracle of a manifold with boundary: it is where all walls are at least 0 on M^, a manifold
-   * without one, of which the other methods tell; it may be R^d itself. The walls of a face ascend.
+   * without one, which the other methods describe; it may be R^d. The walls of a face ascend.
    */
   interface WithWalls extends WithTangents {
     /** How many there are. */
@@ -70,7 +70,7 @@ public interface Oracle {
     /** As closestPoint, of points of M^ where the walls of the face are 0, whatever others are. */
     void facePoint(double[] x, int[] face, double[] points, boolean[] found) throws Exception;
 
-    /** The walls' values at points [n, d], of which the sign counts: [n, walls]. */
+    /** The walls' values at points [n, d], whose signs count: [n, walls]. */
     void clearances(double[] points, double[] values) throws Exception;
 
     /**

@@ -23,7 +23,7 @@ final class Outage {
   }
 
   private final Patience patience;
-  private final boolean quiet; // leaves it to others to tell of an outage
+  private final boolean quiet; // leaves it to others to report an outage
   private final CountDownLatch stopped = new CountDownLatch(1);
   private int attempts;
   private long lostAt;
@@ -120,7 +120,7 @@ final class Outage {
     double longer = Math.pow(WAITS.number("pause_growth"), attempts);
     double full = Math.min(WAITS.number("first_pause") * longer, WAITS.number("longest_pause"));
     attempts++;
-    // Shortened at random: the clients of a server that comes back do not all come at once.
+    // Shortened at random: the clients of a server that comes back do not come all together.
     double chance = ThreadLocalRandom.current().nextDouble();
     double pause = full * (1 - WAITS.number("pause_jitter") * chance);
     try {

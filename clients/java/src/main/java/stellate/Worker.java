@@ -35,7 +35,7 @@ final class Worker {
   private volatile Stream stream;
   private volatile boolean stopped;
 
-  Consumer<Throwable> onFailure = error -> {}; // told what the oracle threw, before the server is
+  Consumer<Throwable> onFailure = error -> {}; // gets what the oracle threw, before the server does
   boolean tells = true; // whether the server is
 
   Worker(
