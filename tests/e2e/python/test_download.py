@@ -225,20 +225,27 @@ def test_a_download_that_cannot_be_resumed():
     assert len(fake.asked) == 1
 
 
+def with_fault(fault, parts):
+    """A stream of parts that makes no sense."""
+    for part in parts:
+        if fault == "skips" and part.first_vertex == 2:
+            continue
+        if fault == "promises":
+            part.simplices = 8
+        if fault == "ends" and part.complete:
+            return
+        if fault == "refers" and part.complete:
+            part.cells.CopyFrom(indices([[4, 9]]))
+        if fault == "turns":
+            part.orientation.turned = b"more"
+        yield part
+
+
 @pytest.mark.parametrize("fault", ["skips", "promises", "ends", "refers"])
 def test_a_server_that_makes_no_sense(fault):
     class Faulty(Scattered):
         def DownloadMesh(self, request, context):
-            for part in super().DownloadMesh(request, context):
-                if fault == "skips" and part.first_vertex == 2:
-                    continue
-                if fault == "promises":
-                    part.simplices = 8
-                if fault == "ends" and part.complete:
-                    return
-                if fault == "refers" and part.complete:
-                    part.cells.CopyFrom(indices([[0, 9]]))
-                yield part
+            yield from with_fault(fault, super().DownloadMesh(request, context))
 
     with serving(Faulty()) as address, pytest.raises(stellate.StellateError) as caught:
         stellate.download("meshes/x", server=address)
@@ -384,18 +391,7 @@ def test_a_server_that_sends_no_order_is_asked_for_the_whole_mesh(tmp_path):
 def test_no_file_is_there_by_halves(fault, tmp_path):
     class Faulty(Sorted):
         def DownloadMesh(self, request, context):
-            for part in super().DownloadMesh(request, context):
-                if fault == "skips" and part.first_vertex == 2:
-                    continue
-                if fault == "promises":
-                    part.simplices = 8
-                if fault == "ends" and part.complete:
-                    return
-                if fault == "refers" and part.complete:
-                    part.cells.CopyFrom(indices([[4, 9]]))
-                if fault == "turns":
-                    part.orientation.turned = b"more"
-                yield part
+            yield from with_fault(fault, super().DownloadMesh(request, context))
 
     (tmp_path / "a.vtu").write_text("old")
 
