@@ -1,5 +1,7 @@
 #pragma once
 
+#include <Eigen/Core>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -174,19 +176,31 @@ class StarSurroundings final : public Surroundings<K> {
     return true;
   }
 
-  // Whether the conormals at two points of a face are less than a right angle apart, wall by wall.
+  // Whether the conormals at two points of a face are less than a right angle apart, wall by wall,
+  // and all together: the spaces that they span, oriented by them. Where two walls nearly touch,
+  // both conormals are nearly the same on all branches of their edge, whose directions are not.
   static bool FaceAlike(const Site& one, const Site& other, WallSet walls, int n) {
-    bool alike = true;
-    ForEachWall(walls, [&](int wall) {
-      const double* const here = ConormalOf(one, wall);
-      const double* const there = ConormalOf(other, wall);
-      double cosine = 0;
-      for (int a = 0; a < K; ++a)
-        for (int b = 0; b < K; ++b)
-          cosine += here[a] * there[b] * Dot(one.tangent + a * n, other.tangent + b * n, n);
-      alike = alike && cosine > 0;
+    Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, K, K> cosines(CountWalls(walls),
+                                                                           CountWalls(walls));
+    Eigen::Index row = 0;
+    ForEachWall(walls, [&](int here) {
+      Eigen::Index column = 0;
+      ForEachWall(walls,
+                  [&](int there) { cosines(row, column++) = Cosine(one, here, other, there, n); });
+      ++row;
     });
-    return alike;
+    return (cosines.diagonal().array() > 0).all() && cosines.determinant() > 0;
+  }
+
+  // Of the angle between the conormals of two walls, each at a point.
+  static double Cosine(const Site& one, int here, const Site& other, int there, int n) {
+    const double* const a = ConormalOf(one, here);
+    const double* const b = ConormalOf(other, there);
+    double cosine = 0;
+    for (int i = 0; i < K; ++i)
+      for (int j = 0; j < K; ++j)
+        cosine += a[i] * b[j] * Dot(one.tangent + i * n, other.tangent + j * n, n);
+    return cosine;
   }
 
   static const double* ConormalOf(const Site& site, int wall) {

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <random>
 #include <set>
 #include <utility>
@@ -117,6 +118,34 @@ TEST(EncroachedBy, FindsTheWorstOfAllFaces) {
   }
   EXPECT_GT(encroached, 100);
   EXPECT_GT(free, 100);
+}
+
+// Two walls, {z = 0} and {z = x y - 0.1}, nearly touch, and meet in the branches of a hyperbola. At
+// points of both branches the conormals of each wall are nearly the same, but the edge's direction,
+// by the two, is not. The stars of such points share no centre in the middle between the branches:
+// the centres in each are in the direction of the edge there.
+TEST(StarsOfFaces, ShareNoCentreWithAnotherBranchOfTheirEdge) {
+  Stars<3> stars(3, 1, {10.0, CentreRule::kCommonCentre});
+  const double points[2][3] = {{0.5, 0.2, 0}, {-0.2, -0.5, 0}};
+  for (const auto& point : points) {
+    const double steep = std::sqrt(1 + point[0] * point[0] + point[1] * point[1]);
+    const double outward[6] = {0, 0, -1, point[1] / steep, point[0] / steep, -1 / steep};
+    stars.Add(point, kFrame, Stars<3>::kNone, WallSet{3}, outward);
+  }
+  stars.Commit();
+  for (const std::uint32_t p : {0u, 1u}) {
+    const auto& cell = stars.cell(p);
+    int shared = 0;
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+      const auto simplex = stars.FaceSimplexOf(p, cell, v);
+      if (simplex.walls != WallSet{3}) continue;
+      shared += simplex.count == 2;
+      // The walls' facets are a trillionth of the cell's size off the walls' planes.
+      EXPECT_NEAR(cell.x(v)[2], 0, 1e-9) << p;
+      EXPECT_NEAR(cell.x(v)[0] * points[p][1] + cell.x(v)[1] * points[p][0], 0, 1e-9) << p;
+    }
+    EXPECT_EQ(shared, 1) << p;
+  }
 }
 
 }  // namespace
