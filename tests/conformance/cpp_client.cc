@@ -11,12 +11,14 @@
 #include <string>
 #include <thread>
 #include <utility>
+#include <vector>
 
 #include "files.h"
 #include "silent_oracle.h"
 #include "stellate/catalogue.h"
 #include "stellate/client.h"
 #include "stellate/monitor.h"
+#include "stellate/reconstruct.h"
 #include "stellate/serve.h"
 #include "support/spoiled_oracle.h"
 
@@ -184,6 +186,23 @@ std::string Create(const std::string& label, const std::string& how, const std::
   return mesh ? "created -" : Words(mesh.error());
 }
 
+// A file with lines of other lengths is no matrix, and is refused as it is read.
+std::string FromPoints(const std::string& path, int k, int d, const std::string& server) {
+  std::vector<double> numbers;
+  std::ifstream file(path);
+  for (double x = 0; file >> x;) numbers.push_back(x);
+  const auto count = static_cast<Eigen::Index>(numbers.size());
+  if (count % d != 0) return "error request INVALID_ARGUMENT no whole points";
+  ReconstructOptions options;
+  options.dimension = k;
+  options.connection.server = server;
+  const Expected<Mesh> mesh =
+      Reconstruct(Eigen::Map<const Eigen::MatrixXd>(numbers.data(), d, count / d), options);
+  if (!mesh) return Words(mesh.error());
+  return std::string("mesh - ") + TerminationName(mesh->report.termination) + " " +
+         CertificateLevelName(mesh->report.certificate.level);
+}
+
 std::string Save(const std::string& file, const std::string& path) {
   const auto saved = ReadTxt(file).Save(path);
   return saved ? "saved" : Words(saved.error());
@@ -199,6 +218,7 @@ std::string Obey(const std::string& line, const std::string& server) {
   words >> command >> first >> second >> k >> d;
   if (command == "watch") return Watch(k, d, second, server);
   if (command == "create") return Create(first, second, server);
+  if (command == "reconstruct") return FromPoints(first, std::stoi(second), k, server);
   if (command == "save") return Save(first, second);
   if (command != "serve") return "unsupported";
   if (second.rfind("circle:", 0) == 0) {

@@ -1,8 +1,9 @@
-"""A worker in bare gRPC, with the fault that its argument names: what `stellate conform` must find.
+"""A worker, and an upload, in bare gRPC, with the fault that its argument names: what `stellate conform` must find.
 
 faulty_client.py FAULT ADDRESS
 """
 
+import hashlib
 import sys
 import threading
 import time
@@ -11,6 +12,7 @@ import grpc
 import numpy as np
 import stellate
 from python_client import named
+from stellate._generated import mesh_pb2, stellate_pb2
 from stellate._generated import oracle_pb2 as pb
 from stellate._generated import stellate_pb2_grpc as rpc
 from stellate._wire.arrays import from_wire, to_wire
@@ -134,6 +136,40 @@ def serve(stub, mesh, manifold):
             return f"error {kind} {name} {error.details()}"
 
 
+def chunks(points, name, first):
+    yield stellate_pb2.PointsChunk(mesh=name)
+    step = 30_000 if FAULT != "one-chunk" else len(points)
+    for row in range(first, len(points), step):
+        rows = points[row : row + step]
+        if FAULT == "single-precision":
+            rows = rows.astype("<f4").astype("<f8")
+        yield stellate_pb2.PointsChunk(
+            points=stellate_pb2.Points(first_row=row, points=to_wire(rows))
+        )
+    summed = points[first:] if FAULT == "digest-of-the-rest" else points
+    digest = hashlib.sha256(np.ascontiguousarray(summed, "<f8").tobytes()).digest()
+    yield stellate_pb2.PointsChunk(end=stellate_pb2.PointsEnd(points_sha256=digest))
+
+
+def reconstruct(stub, path, k, d):
+    try:
+        points = np.loadtxt(path).reshape(-1, int(d))
+    except ValueError as error:
+        return f"error invalidargument INVALID_ARGUMENT {error}"
+    spec = mesh_pb2.Reconstruction(dimension=int(k), ambient_dimension=int(d), points=len(points))
+    name = stub.Reconstruct(iter([stellate_pb2.PointsChunk(spec=spec)])).mesh.name
+    for _ in range(9):
+        try:
+            asked = stub.Reconstruct(iter([stellate_pb2.PointsChunk(mesh=name)]))
+            stub.Reconstruct(chunks(points, name, 0 if FAULT == "starts-over" else asked.rows))
+        except grpc.RpcError as error:
+            if error.code() == grpc.StatusCode.UNAVAILABLE or FAULT == "sends-again":
+                continue
+            return f"error invalidargument INVALID_ARGUMENT {error.details()}"
+        return "mesh - CANCELLED -"
+    return "error unavailable UNAVAILABLE"
+
+
 def main():
     options = [
         ("grpc.keepalive_time_ms", 500),
@@ -144,6 +180,9 @@ def main():
         stub = rpc.StellateStub(channel)
         for line in sys.stdin:
             command, *rest = line.split()
+            if command == "reconstruct":
+                print(reconstruct(stub, *rest), flush=True)
+                continue
             works = command == "serve" and rest[1] != "sphere"
             print(serve(stub, *rest) if works else "unsupported", flush=True)
 

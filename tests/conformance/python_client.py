@@ -139,6 +139,14 @@ def create(client: stellate.Client, label: str, how: str = "") -> str:
     return f"created {client.create(torus, 0.5, label=label).name}"
 
 
+def reconstruct(client: stellate.Client, path: str, dimension: str, _ambient: str) -> str:
+    rows = [
+        [float(x) for x in line.split()] for line in pathlib.Path(path).read_text().splitlines()
+    ]
+    mesh = stellate.reconstruct(rows, int(dimension), server=client)
+    return f"mesh - {mesh.report.termination} {mesh.report.certificate.level}"
+
+
 def save(client: stellate.Client, mesh: str, path: str) -> str:
     stellate.load_txt(pathlib.Path(mesh)).save(path)
     return "saved"
@@ -148,7 +156,10 @@ def main() -> None:
     with stellate.Client(sys.argv[1]) as client:
         for line in sys.stdin:
             command, *rest = line.split()
-            does = {"serve": serve, "watch": watch, "create": create, "save": save}[command]
+            does = {
+                "serve": serve, "watch": watch, "create": create, "reconstruct": reconstruct,
+                "save": save,
+            }[command]  # fmt: skip
             try:
                 answer = does(client, *rest)
             except stellate.StellateError as error:

@@ -17,9 +17,10 @@ from .recorder import Recorder
 from .results import FAIL, PASS, UNTRIED, Result, Results
 from .scenario import Scenario, run
 from .server import Service, start
+from .uploader import point_scenarios
 from .watcher import file_scenarios, watcher_scenarios
 
-_ROLES = ("worker", "watcher", "creator", "files")
+_ROLES = ("worker", "watcher", "creator", "points", "files")
 _GONE_SECONDS = 1.0
 
 HELP = """\
@@ -36,6 +37,9 @@ standard input, one after the other, each with one line of its standard output:
   create LABEL           declares the torus with that label and epsilon 0.5: "created MESH";
   create LABEL seeds     with a seed in place of the box; LABEL token=TOKEN: with that token
   create LABEL walls     declares the lune
+  reconstruct PATH K D   reads the numbers of PATH, a point a line, and has them reconstructed, as a
+                         manifold of dimension K in R^D: the mesh's "mesh - TERMINATION LEVEL". The
+                         kit looks at what is sent, and then cancels the mesh
   save MESH PATH         reads the .txt file MESH, and saves it to PATH: "saved"
 
 or with "error CLASS REASON WORDS" where that came of it, or with "unsupported". "-" stands for what the
@@ -89,6 +93,8 @@ def _scenarios(
         yield from creator_scenarios(*arguments)
     if "watcher" in roles:
         yield from watcher_scenarios(folder, *arguments)
+    if "points" in roles:
+        yield from point_scenarios(folder, *arguments)
     if "files" in roles:
         yield from file_scenarios(folder, *arguments)
     if "worker" in roles:

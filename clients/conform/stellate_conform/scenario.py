@@ -50,6 +50,7 @@ class Scenario:
 
     name = ""
     rules: tuple[str, ...] = ()
+    max_message_bytes = 0  # that the server says it takes; 0: it says nothing
 
     def __init__(self, results: Results, patience: float) -> None:
         self.mesh = f"meshes/{secrets.token_hex(16)}"
@@ -76,6 +77,12 @@ class Scenario:
 
     def watch(self, request: Any) -> Iterator[stellate_pb2.WatchMeshResponse]:
         raise Refusal(grpc.StatusCode.FAILED_PRECONDITION, "the kit did not ask for a watcher")
+
+    def download(self, request: Any) -> Iterator[stellate_pb2.DownloadMeshResponse]:
+        raise Refusal(grpc.StatusCode.NOT_FOUND, "the kit has no mesh", "MESH_NOT_FOUND")
+
+    def upload(self, chunks: Iterator[Any]) -> stellate_pb2.ReconstructReply:
+        raise Refusal(grpc.StatusCode.FAILED_PRECONDITION, "the kit did not ask for points")
 
     def serve(self, stream: Any) -> None:
         raise Refusal(grpc.StatusCode.FAILED_PRECONDITION, "the kit did not ask for a worker")

@@ -82,6 +82,8 @@ class Service(rpc.StellateServicer):
 
     def GetServerInfo(self, request: Any, context: Any) -> Any:
         info = stellate_pb2.ServerInfo(version="conform", protocols=["stellate.v1"])
+        if self.scenario is not None:
+            info.max_message_bytes = self.scenario.max_message_bytes
         return self._once("GetServerInfo", request, context, lambda: info)
 
     def CreateMesh(self, request: Any, context: Any) -> Any:
@@ -100,6 +102,22 @@ class Service(rpc.StellateServicer):
         from google.protobuf import empty_pb2
 
         return self._once("DeleteMesh", request, context, empty_pb2.Empty)
+
+    def Reconstruct(self, requests: Any, context: Any) -> Any:
+        call = self._recorder.begin("Reconstruct")
+
+        def noted() -> Iterator[Any]:
+            for request in requests:
+                call.came(request)
+                yield request
+            call.client_done()
+
+        return list(_told(call, context, lambda: [self._on().upload(noted())]))[0]
+
+    def DownloadMesh(self, request: Any, context: Any) -> Any:
+        call = self._recorder.begin("DownloadMesh")
+        call.came(request)
+        yield from _told(call, context, lambda: self._on().download(request))
 
     def WatchMesh(self, request: Any, context: Any) -> Any:
         call = self._recorder.begin("WatchMesh")

@@ -1,5 +1,5 @@
 // Obeys `stellate conform`, whose help says what each line wants.
-import { writeFile } from "node:fs/promises";
+import { readFile, writeFile } from "node:fs/promises";
 import { createInterface } from "node:readline";
 import { setTimeout } from "node:timers/promises";
 import {
@@ -9,6 +9,7 @@ import {
   type Mesh,
   type Oracle,
   ProductOfCircles,
+  reconstruct,
   StellateError,
   Torus,
   watch,
@@ -173,10 +174,18 @@ async function follow(name: string, path: string): Promise<string> {
   return `mesh ${last?.revision} ${report?.termination} ${report?.certificate?.level}`;
 }
 
-async function obey(command: string, what: string, more: string): Promise<string> {
+async function fromPoints(path: string, k: number, d: number): Promise<string> {
+  const numbers = (await readFile(path, "utf8")).trim().split(/\s+/).map(Number);
+  const asked = { dimension: k, ambientDimension: d, server: client };
+  const { report } = await reconstruct(Float64Array.from(numbers), asked);
+  return `mesh - ${report?.termination} ${report?.certificate?.level}`;
+}
+
+async function obey(command: string, what: string, more: string, last: string): Promise<string> {
   try {
     if (command === "create") return await create(what, more);
     if (command === "watch") return await follow(what, more);
+    if (command === "reconstruct") return await fromPoints(what, Number(more), Number(last));
     if (command === "save") {
       await (await loadTxt(what)).save(more);
       return "saved";
@@ -190,7 +199,7 @@ async function obey(command: string, what: string, more: string): Promise<string
 }
 
 for await (const line of createInterface(process.stdin)) {
-  const [command, what, more] = line.split(" ");
-  console.log(await obey(command, what, more));
+  const [command, what, more, last] = line.split(" ");
+  console.log(await obey(command, what, more, last));
 }
 client.close();

@@ -137,9 +137,17 @@ def watch(name, path, *_dimensions)
   end
   mesh.save(path)
   File.write("#{path}.walls", mesh.walls.map { |bits| "#{bits}\n" }.join) if mesh.walls
-  ended = Stellate::Wire.name(mesh.report.termination, 'TERMINATION_')
+  "mesh #{mesh.revision} #{ended(mesh)}"
+end
+
+def ended(mesh)
   level = Stellate::Wire.name(mesh.report.certificate&.level || 0, 'CERTIFICATE_LEVEL_')
-  "mesh #{mesh.revision} #{ended} #{level}"
+  "#{Stellate::Wire.name(mesh.report.termination, 'TERMINATION_')} #{level}"
+end
+
+def reconstruct(path, dimension, _ambient)
+  points = File.foreach(path).map { |line| line.split.map { |word| Float(word) } }
+  "mesh - #{ended(Stellate.reconstruct(points, dimension: Integer(dimension), server: CLIENT))}"
 end
 
 def save(mesh, path)
@@ -159,7 +167,7 @@ end
 $stdin.each_line do |line|
   command, *words = line.split
   begin
-    puts %w[serve watch create save].include?(command) ? send(command, *words) : 'unsupported'
+    puts %w[serve watch create reconstruct save].include?(command) ? send(command, *words) : 'unsupported'
   rescue Stellate::StellateError => e
     puts "error #{e.class.name.split('::').last} #{e.reason} #{e.message.tr("\n", ' ')}"
   end

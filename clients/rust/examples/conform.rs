@@ -5,8 +5,8 @@ use std::io::BufRead;
 use stellate::manifolds::Torus;
 use stellate::proto::{CertificateLevel, Termination};
 use stellate::{
-    BoxError, Capabilities, Client, ClientOptions, Connection, Credentials, Error, Growth, Kind, Mesh,
-    MeshOptions, Oracle,
+    reconstruct, BoxError, Capabilities, Client, ClientOptions, Connection, Credentials, Error, Growth,
+    Kind, Mesh, MeshOptions, Oracle, PointCloud, ReconstructOptions,
 };
 
 use manifolds::manifold;
@@ -39,11 +39,25 @@ fn watch(client: &Client, mesh: &str, path: &str) -> Result<String, Error> {
         let lines: String = mesh.walls.iter().map(|bits| format!("{bits}\n")).collect();
         std::fs::write(format!("{path}.walls"), lines).expect("a folder of the kit's");
     }
-    let report = mesh.report.unwrap_or_default();
+    Ok(format!("mesh {} {}", mesh.revision, how_it_ended(&mesh)))
+}
+
+fn how_it_ended(mesh: &Mesh) -> String {
+    let report = mesh.report.clone().unwrap_or_default();
     let level = report.certificate.as_ref().map_or(0, |proved| proved.level);
     let ended = name(report.termination, Termination::as_str_name, "TERMINATION_");
     let level = name(level, CertificateLevel::as_str_name, "CERTIFICATE_LEVEL_");
-    Ok(format!("mesh {} {ended} {level}", mesh.revision))
+    format!("{ended} {level}")
+}
+
+fn from_points(client: &Client, path: &str, dimensions: &[&str]) -> Result<String, Error> {
+    let text = std::fs::read_to_string(path).expect("a file of the kit's");
+    let points: Vec<f64> =
+        text.split_whitespace().map(|word| word.parse().expect("numbers of the kit's")).collect();
+    let [dimension, ambient_dimension] = [0, 1].map(|i| dimensions[i].parse().expect("a dimension"));
+    let cloud = PointCloud { dimension, ambient_dimension, points: &points, tangents: None };
+    let options = ReconstructOptions { connection: Connection::Client(client), ..Default::default() };
+    Ok(format!("mesh - {}", how_it_ended(&reconstruct(cloud, options)?)))
 }
 
 /// The torus, with a seed in place of its box.
@@ -83,6 +97,7 @@ fn obey(server: &str, client: &Client, words: &[&str]) -> Result<String, Error> 
     match words[0] {
         "create" => create(server, what, more),
         "watch" => watch(client, what, more),
+        "reconstruct" => from_points(client, what, &words[2..]),
         "save" => Mesh::load_txt(what)?.save(more).map(|()| "saved".to_string()),
         "serve" => match manifold(more) {
             Some(oracle) => {

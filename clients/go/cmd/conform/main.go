@@ -8,6 +8,7 @@ import (
 	"fmt"
 	"log"
 	"os"
+	"strconv"
 	"strings"
 
 	"stellate"
@@ -60,9 +61,12 @@ func watch(ctx context.Context, client *stellate.Client, mesh, path string) (str
 	if err != nil {
 		return "", err
 	}
-	return fmt.Sprint("mesh ", last.Revision,
-		" ", name(last.Report.GetTermination(), pb.Termination_name, "TERMINATION_"),
-		" ", name(last.Report.GetCertificate().GetLevel(), pb.CertificateLevel_name, "CERTIFICATE_LEVEL_")), nil
+	return fmt.Sprint("mesh ", last.Revision, " ", ended(last)), nil
+}
+
+func ended(mesh *stellate.Mesh) string {
+	return name(mesh.Report.GetTermination(), pb.Termination_name, "TERMINATION_") +
+		" " + name(mesh.Report.GetCertificate().GetLevel(), pb.CertificateLevel_name, "CERTIFICATE_LEVEL_")
 }
 
 func create(ctx context.Context, label, how string) (string, error) {
@@ -87,9 +91,33 @@ func create(ctx context.Context, label, how string) (string, error) {
 	return "created " + mesh.GetName(), err
 }
 
+func reconstruct(ctx context.Context, path, k, d string) (string, error) {
+	text, err := os.ReadFile(path)
+	if err != nil {
+		return "", err
+	}
+	cloud := stellate.PointCloud{}
+	cloud.Dimension, _ = strconv.Atoi(k)
+	cloud.AmbientDimension, _ = strconv.Atoi(d)
+	for _, word := range strings.Fields(string(text)) {
+		x, err := strconv.ParseFloat(word, 64)
+		if err != nil {
+			return "", err
+		}
+		cloud.Points = append(cloud.Points, x)
+	}
+	options := stellate.ReconstructOptions{}
+	options.Server, options.OnOutage = os.Args[1], func(string) {}
+	mesh, err := stellate.Reconstruct(ctx, cloud, &options)
+	if err != nil {
+		return "", err
+	}
+	return fmt.Sprint("mesh - ", ended(mesh)), nil
+}
+
 func obey(client *stellate.Client, words []string) (string, error) {
 	ctx := context.Background()
-	words = append(words, "", "")
+	words = append(words, "", "", "")
 	switch words[0] {
 	case "serve":
 		return serve(ctx, client, words[1], words[2])
@@ -97,6 +125,8 @@ func obey(client *stellate.Client, words []string) (string, error) {
 		return watch(ctx, client, words[1], words[2])
 	case "create":
 		return create(ctx, words[1], words[2])
+	case "reconstruct":
+		return reconstruct(ctx, words[1], words[2], words[3])
 	case "save":
 		mesh, err := stellate.LoadTxt(words[1])
 		if err == nil {

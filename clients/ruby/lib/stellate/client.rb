@@ -151,6 +151,11 @@ module Stellate
       rescue GRPC::BadStatus => e
         outage.wait(e)
         on_resume.call
+      rescue GRPC::Core::CallError
+        # gRPC's own, where another thread cancelled the call while it was read.
+        raise unless outage.stopped?
+
+        raise Stellate.from_rpc(GRPC::Cancelled.new('cancelled by this client'))
       end
     end
 

@@ -7,12 +7,14 @@ import java.nio.file.Files;
 import java.nio.file.Path;
 import java.util.ArrayList;
 import java.util.List;
+import java.util.Scanner;
 import java.util.stream.LongStream;
 import stellate.Client;
 import stellate.Credentials;
 import stellate.Mesh;
 import stellate.Options;
 import stellate.Oracle;
+import stellate.ReconstructOptions;
 import stellate.Stellate;
 import stellate.StellateException;
 import stellate.v1.Report;
@@ -47,6 +49,7 @@ public final class Conform {
         case "serve" -> serve(words[1], words[2]);
         case "watch" -> watch(words[1], Path.of(words[2]));
         case "create" -> create(words[1], words[2]);
+        case "reconstruct" -> reconstruct(Path.of(words[1]), words[2], words[3]);
         case "save" -> {
           Mesh.loadTxt(Path.of(words[1])).save(Path.of(words[2]));
           yield "saved";
@@ -81,10 +84,22 @@ public final class Conform {
       List<String> lines = LongStream.of(last.walls).mapToObj(Long::toUnsignedString).toList();
       Files.write(Path.of(path + ".walls"), lines);
     }
-    Report report = last.report().orElseThrow();
-    String ended = name(report.getTermination(), "TERMINATION_");
+    return "mesh " + last.revision + " " + ended(last);
+  }
+
+  private static String ended(Mesh mesh) {
+    Report report = mesh.report().orElseThrow();
     String level = name(report.getCertificate().getLevel(), "CERTIFICATE_LEVEL_");
-    return "mesh " + last.revision + " " + ended + " " + level;
+    return name(report.getTermination(), "TERMINATION_") + " " + level;
+  }
+
+  private String reconstruct(Path path, String k, String d) throws Exception {
+    try (Scanner numbers = new Scanner(path, StandardCharsets.UTF_8)) {
+      double[] points = numbers.tokens().mapToDouble(Double::parseDouble).toArray();
+      var options = ReconstructOptions.on(client);
+      Mesh mesh = Stellate.reconstruct(points, Integer.parseInt(k), Integer.parseInt(d), options);
+      return "mesh - " + ended(mesh);
+    }
   }
 
   private String create(String label, String how) {
