@@ -158,6 +158,30 @@ bool HasPieceTooSmall(const Engine<K>& engine, double epsilon) {
   return bend && epsilon > kMuchTooCoarse * bend->radius();
 }
 
+// Describes where walls of an arrangement come so near each other that they may touch; or empty.
+template <int K>
+std::string WhereWallsTouch(const Engine<K>& engine) {
+  const Stars<K>& stars = engine.stars();
+  for (const std::uint32_t p : stars.sample().boundary()) {
+    CheckInterruption(p);
+    const double bound = engine.sizes().BoundAt(stars, p);
+    const auto worst =
+        WorstSizeOrShape<K>(stars, p, bound, engine.criteria().radius_edge_bound, K - 1);
+    if (!worst || !IsLeftAlone<K>(stars, *worst, bound)) continue;
+    const auto simplex = stars.FaceSimplexOf(p, stars.cell(p, worst->sector), worst->vertex);
+    WallSet others = 0;
+    for (int i = 0; i < simplex.count; ++i)
+      others |= stars.sample().walls(simplex.ids[static_cast<std::size_t>(i)]) & ~simplex.walls;
+    if (!simplex.foreign || others == 0) continue;
+    return Message(
+        "walls ", ListWalls(simplex.walls | others), " come so near each other near ",
+        NamePoint(Eigen::Map<const Eigen::VectorXd>(stars.sample().Point(p), stars.sample().d())),
+        " that they may touch there: move one of them, so that they cross at an angle or stay "
+        "apart by more than a fiftieth of epsilon");
+  }
+  return "";
+}
+
 template <int K>
 void ExplainWallCurvature(const Engine<K>& engine, double epsilon,
                           const std::optional<PieceOfWall>& piece, Certificate* certificate) {
@@ -179,6 +203,8 @@ void ExplainWallCurvature(const Engine<K>& engine, double epsilon,
          &certificate->verdict);
     return;
   }
+  // Near such a place pieces of walls are small by themselves.
+  if (!WhereWallsTouch<K>(engine).empty()) return;
   const PieceOfWall small = lone ? PieceOfWall{std::countr_zero(stars.sample().walls(*lone)),
                                                Eigen::Map<const Eigen::VectorXd>(
                                                    stars.sample().Point(*lone), stars.sample().d())}
@@ -294,30 +320,6 @@ std::string AboutLeftFaces(const Engine<K>& engine) {
       " vertices, the first at ",
       NamePoint(Eigen::Map<const Eigen::VectorXd>(stars.sample().Point(first), stars.sample().d())),
       ", and the rest was meshed without them; ");
-}
-
-// Describes where walls of an arrangement come so near each other that they may touch; or empty.
-template <int K>
-std::string WhereWallsTouch(const Engine<K>& engine) {
-  const Stars<K>& stars = engine.stars();
-  for (const std::uint32_t p : stars.sample().boundary()) {
-    CheckInterruption(p);
-    const double bound = engine.sizes().BoundAt(stars, p);
-    const auto worst =
-        WorstSizeOrShape<K>(stars, p, bound, engine.criteria().radius_edge_bound, K - 1);
-    if (!worst || !IsLeftAlone<K>(stars, *worst, bound)) continue;
-    const auto simplex = stars.FaceSimplexOf(p, stars.cell(p, worst->sector), worst->vertex);
-    WallSet others = 0;
-    for (int i = 0; i < simplex.count; ++i)
-      others |= stars.sample().walls(simplex.ids[static_cast<std::size_t>(i)]) & ~simplex.walls;
-    if (!simplex.foreign || others == 0) continue;
-    return Message(
-        "walls ", ListWalls(simplex.walls | others), " come so near each other near ",
-        NamePoint(Eigen::Map<const Eigen::VectorXd>(stars.sample().Point(p), stars.sample().d())),
-        " that they may touch there: move one of them, so that they cross at an angle or stay "
-        "apart by more than a fiftieth of epsilon");
-  }
-  return "";
 }
 
 template <int K>

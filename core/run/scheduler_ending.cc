@@ -91,6 +91,7 @@ void Scheduler<K>::DescribeEnding() {
     ExplainInactiveWall<K>(engine_, spec_.walls, &certificate);
   // The one that explains the most leads in the end.
   ExplainSharpest<K>(engine_, termination == Termination::kNoProgress, &certificate);
+  if (noticed_.box.has_left()) return;
   ExplainNearCorners<K>(engine_, spec_.epsilon, &certificate);
   if (termination == Termination::kConverged || termination == Termination::kNoProgress)
     ExplainWallCurvature<K>(engine_, spec_.epsilon, noticed_.piece, &certificate);

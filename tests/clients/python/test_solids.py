@@ -250,6 +250,8 @@ def test_an_intersection_needs_no_labels():
         (lambda: s.Cylinder(axis="w"), "'x', 'y', 'z'"),
         (lambda: s.Cylinder(axis=[0, 0, 0]), "other than 0"),
         (lambda: s.Torus(0.3, 0.4), "minor < major"),
+        (lambda: s.Ball([0, 0, 0], 1), "radius, which comes first"),
+        (lambda: s.HalfSpace([0, 0, 1], [0, 0, 0.3]), "offset has to be a number, normal . p"),
         (lambda: s.Capsule([0, 0, 0], [0, 0, 0]), "two points that differ"),
         (lambda: s.Ball().rotated(np.ones((3, 3))), "orthogonal"),
         (lambda: s.Ball().scaled(0), "above 0"),

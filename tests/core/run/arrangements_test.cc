@@ -329,21 +329,25 @@ TEST(Arrangements, AWallThatNoLabelDependsOnIsNoConcern) {
 
 // Two balls that nearly touch: each wall would cut the other's simplices without end.
 TEST(Arrangements, WallsThatNearlyTouchAreNamed) {
-  Arrangement touching = testing::SpaceArrangements()[0];
-  touching.domain.walls = {testing::InBall(Eigen::Vector3d(-1.0002, 0, 0), 1),
-                           testing::InBall(Eigen::Vector3d(1.0002, 0, 0), 1)};
-  touching.domain.box = testing::CubeOf(3, 2.2);
-  Specification spec = touching.SpecificationFor(0.4);
-  spec.limits.max_vertices = 20000;
-  const auto mesh = MeshOf(touching.domain, spec);
-  ASSERT_TRUE(mesh) << mesh.error().message;
-  const Report& report = mesh->report;
-  EXPECT_FALSE(report.certificate.certified);
-  EXPECT_EQ(report.termination, Termination::kNoProgress) << report.counts.vertices;
-  EXPECT_NE(report.certificate.verdict.find("walls 0, 1 come so near each other near ("),
-            std::string::npos)
-      << report.certificate.verdict;
-  EXPECT_EQ(report.certificate.verdict.find("smaller epsilon"), std::string::npos);
+  for (const double beside : {1.0002, 1.00002}) {
+    SCOPED_TRACE(beside);
+    Arrangement touching = testing::SpaceArrangements()[0];
+    touching.domain.walls = {testing::InBall(Eigen::Vector3d(-beside, 0, 0), 1),
+                             testing::InBall(Eigen::Vector3d(beside, 0, 0), 1)};
+    touching.domain.box = testing::CubeOf(3, 2.2);
+    Specification spec = touching.SpecificationFor(0.4);
+    spec.limits.max_vertices = 20000;
+    const auto mesh = MeshOf(touching.domain, spec);
+    ASSERT_TRUE(mesh) << mesh.error().message;
+    const Report& report = mesh->report;
+    const std::string& verdict = report.certificate.verdict;
+    EXPECT_FALSE(report.certificate.certified);
+    EXPECT_EQ(report.termination, Termination::kNoProgress) << report.counts.vertices;
+    EXPECT_NE(verdict.find("walls 0, 1 come so near each other near ("), std::string::npos)
+        << verdict;
+    EXPECT_EQ(verdict.find("smaller epsilon"), std::string::npos) << verdict;
+    EXPECT_EQ(verdict.find("take epsilon"), std::string::npos) << verdict;
+  }
 }
 
 // Changes add up to the mesh also while stars disagree about labels.

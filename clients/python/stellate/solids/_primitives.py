@@ -25,7 +25,7 @@ class Ball(Solid):
     """The ball of a radius about a point of R^d, any d: one wall."""
 
     def __init__(self, radius: float = 1.0, at: Any = _ORIGIN) -> None:
-        centre, r = vector(at, "the centre"), length(radius, "the radius")
+        r, centre = length(radius, "the radius, which comes first,"), vector(at, "the centre")
         d = len(centre)
         wall = Placed(Tube(r, None), Motion(np.eye(d), 1.0, centre))
         hull = Hull(centre[None, :], np.eye(d)[0], _DOT, r)
@@ -54,6 +54,11 @@ class HalfSpace(Solid):
         inwards = vector(normal, "the normal")
         if not norms(inwards) > 0:
             raise InvalidArgument("a half-space needs a normal other than 0")
+        if not isinstance(offset, (int, float, np.integer, np.floating)) or not np.isfinite(offset):
+            raise InvalidArgument(
+                f"a half-space's offset has to be a number, normal . p for a point p of its plane, "
+                f"and is {offset!r}"
+            )
         super().__init__(Half(Plane(inwards, float(offset))), len(inwards))
 
 
