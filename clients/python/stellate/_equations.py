@@ -6,40 +6,222 @@ error.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any, Callable, NamedTuple
 
 import numpy as np
 
 from ._functions import Exactness, UserFunction
-from ._rows import apply, norms, transposed
+from ._rows import apply, norms, product, transposed
 
 _MAX_VALUES = 4_000_000  # numbers in one call for differences
-_FIRST_STEP = 6e-6  # of central differences: about the cube root of the rounding unit
+_CENTRAL_STEP = 6e-6  # of central differences: about the cube root of the rounding unit
 _SECOND_STEP = 1e-4  # of second differences: about its fourth root
+_HALVED = 12  # times at most, as a step is
 _SLOW = 0.25  # a Jacobian that lowers |F| by less than that is too old
+_STILL, _STOPS = 0.99, 2  # so many steps that leave more than that of |F|, and it is least there
+_SHRINKS = 1e-3  # of a step, at the least what the next one is taken to be
+_AHEAD = 1e-3  # of the tolerance: so short, that one need not be looked for
 
 Batched = Callable[[np.ndarray], np.ndarray]
-# (jacobian (n, m, d), values (n, m), x (n, d), rows (n,) of the batch) -> steps (n, d)
-StepFrom = Callable[[np.ndarray, np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+# (jacobian (n, m, r), values (n, m), rows (n,) of the batch) -> steps (n, r), in what is solved for
+StepFrom = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
 
 
 class Solution(NamedTuple):
     points: np.ndarray  # (n, d), meaningful where converged
-    values: np.ndarray  # (n, m), of F there
+    values: np.ndarray  # (n, m), of F there; 0 where that goes without saying
     converged: np.ndarray  # (n,)
+    slopes: np.ndarray  # (n, m, d), the Jacobian as far as it is known on the way
 
 
-class Equations:
-    """F with its derivatives.
+class System:
+    """F with its derivatives, however they are had, and the solver that drives it to zero.
+
+    Attributes:
+      difference: the step of one-sided differences, which err by rounding over it, and by half of it
+        times the bend.
+      seen_over: (m,), that step, or 0 where derivatives are given.
+
+    Args:
+      shape: (m, d).
+      scale: a length, of the solvers' steps and differences.
+      largest: coordinate; far from the origin its rounding is what a step can reach.
+    """
+
+    def __init__(
+        self, shape: tuple[int, int], scale: float, largest: float, max_iterations: int
+    ) -> None:
+        self.shape, self.scale, self.max_iterations = shape, scale, max_iterations
+        self.largest = largest
+        rounding = float(np.finfo(float).eps)
+        # Of a Newton step, a length: a step moves a point by no less than its coordinates round to,
+        # and what F makes of that is a small multiple.
+        self.tolerance = max(1e-12 * scale, 16 * rounding * largest)
+        self.difference = 2 * scale * float(np.sqrt(rounding * max(1.0, largest / scale)))
+
+    seen_over: np.ndarray
+
+    def values(self, x: np.ndarray) -> np.ndarray:
+        """F at the rows of x."""
+        raise NotImplementedError
+
+    def slopes(
+        self, x: np.ndarray, ways: np.ndarray, values: np.ndarray | None = None
+    ) -> np.ndarray:
+        """(n, m, r): the Jacobian along the columns of ways (n, d, r), or (d, r) for all.
+
+        As given, or by central differences; by one-sided ones from the values (n, m) at x, where these
+        are there.
+        """
+        raise NotImplementedError
+
+    def jacobian(self, x: np.ndarray) -> np.ndarray:
+        """(n, m, d), as given or by central differences."""
+        return self.slopes(x, np.eye(x.shape[1]))
+
+    def bends(
+        self,
+        y: np.ndarray,
+        values: np.ndarray,
+        ways: np.ndarray,
+        slopes: np.ndarray,
+        seen_over: np.ndarray,
+    ) -> np.ndarray:
+        """T^t (d^2 F_i) T at y, for ways T (n, d, k): (n, m, k, k).
+
+        From F at y + h t_a and y + h (t_a + t_b), k (k + 1) / 2 values: what is left of their change
+        after the slopes (n, m, k) along T, which are differences over steps (n, m), or 0 for exact ones.
+        """
+        k, m = ways.shape[2], self.shape[0]
+        bends = np.empty((len(y), m, k, k))
+        for part in _blocks(len(y), k * max(m, k) * self.shape[1]):
+            known = values[part], ways[part], slopes[part], seen_over[part]
+            bends[part] = self._bends(y[part], *known)
+        return bends
+
+    def _bends(
+        self,
+        y: np.ndarray,
+        values: np.ndarray,
+        ways: np.ndarray,
+        slopes: np.ndarray,
+        seen_over: np.ndarray,
+    ) -> np.ndarray:
+        n, d, k = ways.shape
+        h = _SECOND_STEP * self.scale
+        first, second = np.triu_indices(k, 1)
+        t, climb = transposed(ways), transposed(slopes)
+        steps = h * np.concatenate([t, t[:, first] + t[:, second]], axis=1)
+        around = (y[:, None, :] + steps).reshape(-1, d)
+        change = self.values(around).reshape(n, steps.shape[1], -1) - values[:, None, :]
+        change -= h * np.concatenate([climb, climb[:, first] + climb[:, second]], axis=1)
+        bend = transposed(2 / h**2 * change)
+        bends = np.empty((n, self.shape[0], k, k))
+        diagonal = np.arange(k)
+        # Slopes that were seen over a step have half of its bend in them.
+        bends[:, :, diagonal, diagonal] = bend[:, :, :k] / (1 - seen_over / h)[:, :, None]
+        mixed = (bend[:, :, k:] - bend[:, :, first] - bend[:, :, second]) / 2
+        bends[:, :, first, second] = bends[:, :, second, first] = mixed
+        return bends
+
+    def drive(
+        self,
+        start: np.ndarray,
+        step_from: StepFrom,
+        slopes: np.ndarray | None = None,
+        most: int | None = None,
+        ways: np.ndarray | None = None,
+        enough: float = 0.0,
+        came: np.ndarray | None = None,
+    ) -> Solution:
+        """Drives F to zero from each row of `start`; steps are halved until |F| falls.
+
+        Jacobians are expensive, so that steps share them: each corrects the last by what it has seen
+        (Broyden).
+
+        Args:
+          slopes: Jacobians (n, m, d) of points near `start`, to begin with.
+          most: steps, if fewer than max_iterations are to do.
+          ways: (n, d, r), the directions to move in; None: all.
+          enough: of |F| at the start, where less than that will do.
+          came: (n,), how long the step to `start` was, if these are the last ones of a way.
+        """
+        y = np.array(start, dtype=float)
+        values = self.values(y)
+        alive = np.isfinite(values).all(axis=1)
+        converged = np.zeros(len(y), dtype=bool)
+        last = np.full(len(y), np.nan) if came is None else came.copy()
+        near, stills = enough * norms(values), np.zeros(len(y), dtype=int)
+        shared = _Shared(self, y, values, slopes, ways)
+        for _ in range(min(most or self.max_iterations, self.max_iterations)):
+            rows = np.flatnonzero(alive & ~converged)
+            if not rows.size:
+                break
+            step = step_from(shared.at(rows), values[rows], rows)
+            usable = np.isfinite(step).all(axis=1)
+            shared.renew_or_kill(rows[~usable], alive)
+            rows, step = rows[usable], step[usable]
+            length = norms(step)
+            # A step this short lands on M to rounding; halving could only see noise.
+            short = length <= self.tolerance * 1e4
+            with np.errstate(invalid="ignore", divide="ignore"):
+                shrinks = length / last[rows]
+                ahead = length * np.maximum(shrinks, _SHRINKS) <= _AHEAD * self.tolerance
+            arrived = (length <= self.tolerance) | short & ahead
+            shared.forget(rows[short & (shrinks > _SLOW)])
+            last[rows] = length
+            y[rows[short]] += shared.across(rows[short], step[short])
+            converged[rows[arrived]] = True
+            values[rows[arrived]] = 0.0
+            on = rows[short & ~arrived]
+            values[on] = self.values(y[on])
+            step *= (np.minimum(length, 0.25 * self.scale) / np.maximum(length, 1e-300))[:, None]
+            rows, step = rows[~short], step[~short]
+            before = norms(values[rows])
+            self._halve_until_better(y, values, shared, alive, rows, step)
+            stills[rows] = (stills[rows] + 1) * (norms(values[rows]) > _STILL * before)
+            alive &= stills < _STOPS
+            if enough > 0:
+                converged |= alive & (norms(values) <= near)
+        return Solution(y, values, converged, shared.slopes)
+
+    def _halve_until_better(
+        self,
+        y: np.ndarray,
+        values: np.ndarray,
+        shared: _Shared,
+        alive: np.ndarray,
+        rows: np.ndarray,
+        step: np.ndarray,
+    ) -> None:
+        """Takes, in place, the longest of step, step/2, ... that lowers |F|; kills if none does."""
+        fraction = 1.0
+        for _ in range(_HALVED):
+            if not rows.size:
+                return
+            trial = y[rows] + shared.across(rows, fraction * step)
+            trial_values = self.values(trial)
+            with np.errstate(invalid="ignore"):
+                size, trial_size = norms(values[rows]), norms(trial_values)
+                better = trial_size <= (1 - 1e-4 * fraction) * size
+            taken = rows[better]
+            slow = (trial_size > _SLOW * size)[better]
+            change = trial_values[better] - values[taken]
+            shared.moved(taken, fraction * step[better], change, slow)
+            y[taken], values[taken] = trial[better], trial_values[better]
+            rows, step = rows[~better], step[~better]
+            fraction /= 2
+        shared.renew_or_kill(rows, alive)
+
+
+class Equations(System):
+    """F as a user gives it.
 
     Args:
       f: (n, d) -> (n, m), or (n,) for m = 1.
-      jacobian: (n, d) -> (n, m, d), or (n, d) for m = 1; None for differences of f. Differences are expensive, so that
-        steps share them: each corrects the Jacobian by what it has seen (Broyden).
-      scale: a length, of the solvers' steps and differences.
-      box: (lower (d,), upper (d,)); far from the origin the rounding of its coordinates is what a step
-        can reach.
+      jacobian: (n, d) -> (n, m, d), or (n, d) for m = 1; None for differences of f.
+      box: (lower (d,), upper (d,)), where it is looked at.
       about: (s, d) points near the zeros, where f is looked at first; None: random ones of the box.
     """
 
@@ -54,16 +236,15 @@ class Equations:
         about: Any = None,
     ) -> None:
         """`shape`: (m, d)."""
-        self.shape, d = shape, str(shape[1])
-        why = f"; a manifold of dimension {shape[1] - shape[0]} in R^{d} is given by {d} - {shape[1] - shape[0]} = {shape[0]} equations"
+        super().__init__(
+            shape, scale, float(max(np.abs(corner).max() for corner in box)), max_iterations
+        )
+        (m, size), d = shape, str(shape[1])
+        why = f"; a manifold of dimension {size - m} in R^{d} is given by {d} - {size - m} = {m} equations"
         self._f = UserFunction(f, "f", shape[:1], d, why)
         self._given = None if jacobian is None else UserFunction(jacobian, "jacobian", shape, d)
+        self.seen_over = np.full(m, self.difference if jacobian is None else 0.0)
         self._exactness = Exactness(about, *box)
-        largest = float(max(np.abs(corner).max() for corner in box))
-        self._scale, self._max_iterations = scale, max_iterations
-        # Of a Newton step, a length: a step moves a point by no less than its coordinates round to,
-        # and what F makes of that is a small multiple.
-        self.tolerance = max(1e-12 * scale, 16 * float(np.finfo(float).eps) * largest)
 
     @property
     def functions(self) -> tuple[UserFunction, UserFunction | None]:
@@ -77,174 +258,116 @@ class Equations:
         self._exactness.insist(self._f)
         return self._f(x)
 
-    def jacobian(self, x: np.ndarray) -> np.ndarray:
-        """(n, m, d), as given or by differences, in one call for as many rows as fit."""
-        m, d = self.shape
-        if self._given is None:
-            jacobian = np.empty((len(x), m, d))
-            for part in _blocks(len(x), 2 * d * d):
-                jacobian[part] = self._differences(x[part])
-            return jacobian
-        return self._given(x)
-
-    def _differences(self, x: np.ndarray) -> np.ndarray:
-        (m, d), n = self.shape, len(x)
-        h = _FIRST_STEP * self._scale * np.eye(d)
-        ahead = (x[:, None, :] + h).reshape(-1, d)
-        behind = (x[:, None, :] - h).reshape(-1, d)
-        values = self.values(np.concatenate([ahead, behind]))
-        change = (values[: n * d] - values[n * d :]).reshape(n, d, m)
-        change /= (ahead - behind).sum(axis=1).reshape(n, d, 1)
-        return change.transpose(0, 2, 1)
-
-    def curvature(
-        self, y: np.ndarray, values: np.ndarray, multipliers: np.ndarray, tangents: np.ndarray
+    def slopes(
+        self, x: np.ndarray, ways: np.ndarray, values: np.ndarray | None = None
     ) -> np.ndarray:
-        """sum_i l_i T^t (d^2 F_i) T at y, for l (n, m) and T (n, d, k): (n, k, k)."""
-        k = tangents.shape[2]
-        curvature = np.empty((len(y), k, k))
-        m, d = self.shape
-        step = self._second_differences if self._given is None else self._jacobian_differences
-        for part in _blocks(len(y), 2 * k * max(m, k) * d):
-            curvature[part] = step(y[part], values[part], multipliers[part], tangents[part])
-        return curvature
+        """The Jacobian along ways, see System; in one call for as many rows as fit."""
+        if self._given is not None:
+            return along(self._given(x), ways)
+        return differences(self, x, ways, values)
 
-    def _jacobian_differences(
-        self, y: np.ndarray, values: np.ndarray, multipliers: np.ndarray, tangents: np.ndarray
+
+def along(jacobian: np.ndarray, ways: np.ndarray) -> np.ndarray:
+    """(n, m, d) -> (n, m, r), of ways (n, d, r), or the unit vectors (d, d)."""
+    return jacobian if ways.ndim == 2 else product(jacobian, ways)
+
+
+class Together(System):
+    """Several systems in one space as one, all of whose equations are to hold."""
+
+    def __init__(self, parts: Sequence[System]) -> None:
+        first, counts = parts[0], [part.shape[0] for part in parts]
+        shape = sum(counts), first.shape[1]
+        super().__init__(shape, first.scale, first.largest, first.max_iterations)
+        self.seen_over = np.concatenate([part.seen_over for part in parts])
+        self._parts, self._ends = parts, np.cumsum(counts)[:-1]
+
+    def values(self, x: np.ndarray) -> np.ndarray:
+        """All of them at the rows of x."""
+        return np.concatenate([part.values(x) for part in self._parts], axis=1)
+
+    def slopes(
+        self, x: np.ndarray, ways: np.ndarray, values: np.ndarray | None = None
     ) -> np.ndarray:
-        """From how J^t l changes along each tangent direction."""
-        n, d, k = tangents.shape
-        h = 1e-5 * self._scale
-        along = h * tangents.transpose(0, 2, 1)
-        around = np.concatenate([y[:, None, :] + along, y[:, None, :] - along], axis=1)
-        jacobian = self.jacobian(around.reshape(-1, d)).reshape(n, 2 * k, *self.shape)
-        curvature = np.empty((n, k, k))
-        for a in range(k):
-            change = (jacobian[:, a] - jacobian[:, k + a]) / (2 * h)
-            change = apply(transposed(change), multipliers)
-            curvature[:, :, a] = apply(transposed(tangents), change)
-        return curvature
+        """The Jacobian along ways, see System."""
+        known: Sequence[np.ndarray | None] = [None] * len(self._parts)
+        if values is not None:
+            known = np.split(values, self._ends, axis=1)
+        both = zip(self._parts, known)
+        return np.concatenate([part.slopes(x, ways, here) for part, here in both], axis=1)
 
-    def _second_differences(
-        self, y: np.ndarray, values: np.ndarray, multipliers: np.ndarray, tangents: np.ndarray
-    ) -> np.ndarray:
-        """From l F at y + h t_a and y + h (t_a + t_b) and across from there: k^2 + k values."""
-        n, d, k = tangents.shape
-        h = _SECOND_STEP * self._scale
-        t = tangents.transpose(0, 2, 1)
-        first, second = np.triu_indices(k, 1)
-        along = h * np.concatenate([t, t[:, first] + t[:, second]], axis=1)
-        count = along.shape[1]
-        around = np.concatenate([y[:, None, :] + along, y[:, None, :] - along], axis=1)
-        seen = self.values(around.reshape(-1, d)).reshape(n, 2, count, -1).sum(axis=1)
-        # l F(y + v) - 2 l F(y) + l F(y - v), over h^2
-        bend = ((seen - 2 * values[:, None, :]) * multipliers[:, None, :]).sum(axis=2) / h**2
-        curvature = np.empty((n, k, k))
-        diagonal = np.arange(k)
-        curvature[:, diagonal, diagonal] = bend[:, :k]
-        mixed = (bend[:, k:] - bend[:, first] - bend[:, second]) / 2
-        curvature[:, first, second] = curvature[:, second, first] = mixed
-        return curvature
 
-    def drive(
-        self,
-        start: np.ndarray,
-        step_from: StepFrom,
-        jacobian: np.ndarray | None = None,
-        most: int | None = None,
-    ) -> Solution:
-        """Drives F to zero from each row of `start`; steps are halved until |F| falls.
-
-        `jacobian`: of points near `start`, which saves computing it where Jacobians are shared.
-        `most`: steps, if fewer than max_iterations are to do.
-        """
-        y = np.array(start, dtype=float)
-        values = self.values(y)
-        alive = np.isfinite(values).all(axis=1)
-        converged = np.zeros(len(y), dtype=bool)
-        jacobians = _Shared(self, y, jacobian)
-        for _ in range(min(most or self._max_iterations, self._max_iterations)):
-            rows = np.flatnonzero(alive & ~converged)
-            if not rows.size:
-                break
-            step = step_from(jacobians.at(rows), values[rows], y[rows], rows)
-            usable = np.isfinite(step).all(axis=1)
-            jacobians.renew_or_kill(rows[~usable], alive)
-            rows, step = rows[usable], step[usable]
-            length = norms(step)
-            step *= (np.minimum(length, 0.25 * self._scale) / np.maximum(length, 1e-300))[:, None]
-            # A step this short lands on M to rounding; halving could only see noise.
-            short = length <= self.tolerance * 1e4
-            y[rows[short]] += step[short]
-            converged[rows[length <= self.tolerance]] = True
-            values[rows[short]] = self.values(y[rows[short]])
-            self._halve_until_better(y, values, jacobians, alive, rows[~short], step[~short])
-        return Solution(y, values, converged)
-
-    def _halve_until_better(
-        self,
-        y: np.ndarray,
-        values: np.ndarray,
-        jacobians: _Shared,
-        alive: np.ndarray,
-        rows: np.ndarray,
-        step: np.ndarray,
-    ) -> None:
-        """Takes, in place, the longest of step, step/2, ... that lowers |F|; kills if none does."""
-        fraction = 1.0
-        for _ in range(30):
-            if not rows.size:
-                return
-            trial = y[rows] + fraction * step
-            trial_values = self.values(trial)
-            with np.errstate(invalid="ignore"):
-                size, trial_size = norms(values[rows]), norms(trial_values)
-                better = trial_size <= (1 - 1e-4 * fraction) * size
-            taken = rows[better]
-            slow = (trial_size > _SLOW * size)[better]
-            change = trial_values[better] - values[taken]
-            jacobians.moved(taken, fraction * step[better], change, slow)
-            y[taken], values[taken] = trial[better], trial_values[better]
-            rows, step = rows[~better], step[~better]
-            fraction /= 2
-        jacobians.renew_or_kill(rows, alive)
+def differences(
+    system: System, x: np.ndarray, ways: np.ndarray, here: np.ndarray | None = None
+) -> np.ndarray:
+    """The Jacobian (n, m, r) along ways (n, d, r) or (d, r): from the values `here` (n, m) at x, or central."""
+    (n, d), m, r = x.shape, system.shape[0], ways.shape[-1]
+    h = system.difference if here is not None else _CENTRAL_STEP * system.scale
+    slopes = np.empty((n, m, r))
+    for part in _blocks(n, (1 if here is not None else 2) * r * max(d, m)):
+        at = x[part, None, :]
+        way = np.swapaxes(ways if ways.ndim == 2 else ways[part], -1, -2)
+        ahead = at + h * way
+        behind = at if here is not None else at - h * way
+        asked = ahead if here is not None else np.concatenate([ahead, behind])
+        seen = system.values(asked.reshape(-1, d)).reshape(-1, r, m)
+        count = len(ahead)
+        change = seen[:count] - (here[part, None, :] if here is not None else seen[count:])
+        # As long as steps have come out, along the ways, which are unit vectors.
+        change /= ((ahead - behind) * way).sum(axis=2)[:, :, None]
+        slopes[part] = transposed(change)
+    return slopes
 
 
 class _Shared:
     """The Jacobians of a batch on its way, each at its point or taken along to the next ones."""
 
-    def __init__(self, equations: Equations, y: np.ndarray, near: np.ndarray | None) -> None:
-        self._equations, self._y = equations, y
-        self._shares = equations._given is None
-        self._old = np.ones(len(y), dtype=bool)  # has to be computed
-        self._exact = np.zeros(len(y), dtype=bool)  # is of the very point
-        self._now = np.empty((len(y), *equations.shape))
-        if near is not None and self._shares:
-            self._now[:], self._old[:] = near, False
+    def __init__(
+        self,
+        system: System,
+        y: np.ndarray,
+        values: np.ndarray,
+        near: np.ndarray | None,
+        ways: np.ndarray | None,
+    ) -> None:
+        self._system, self._y, self._values, self._ways = system, y, values, ways
+        m, d = system.shape
+        self._old = np.full(len(y), near is None)  # has to be computed
+        self._fresh = np.zeros(len(y), dtype=bool)  # is of the very point
+        self.slopes = np.zeros((len(y), m, d if ways is None else ways.shape[2]))
+        if near is not None:
+            self.slopes[:] = near
 
     def at(self, rows: np.ndarray) -> np.ndarray:
         old = rows[self._old[rows]]
         if old.size:
-            self._now[old] = self._equations.jacobian(self._y[old])
-            self._old[old], self._exact[old] = not self._shares, True
-        return self._now[rows]
+            ways = np.eye(self._y.shape[1]) if self._ways is None else self._ways[old]
+            self.slopes[old] = self._system.slopes(self._y[old], ways, self._values[old])
+            self._old[old], self._fresh[old] = False, True
+        return self.slopes[rows]
+
+    def across(self, rows: np.ndarray, step: np.ndarray) -> np.ndarray:
+        """Steps (n, r) in the ways that are open, as vectors (n, d)."""
+        return step if self._ways is None else apply(self._ways[rows], step)
 
     def moved(
         self, rows: np.ndarray, step: np.ndarray, change: np.ndarray, slow: np.ndarray
     ) -> None:
         """After a step the Jacobian is made to map it to what it has changed in F."""
-        self._exact[rows] = False
-        if not self._shares:
-            return
+        self._fresh[rows] = False
         self._old[rows[slow]] = True
         rows, step, change = rows[~slow], step[~slow], change[~slow]
-        missing = change - apply(self._now[rows], step)
-        along = step / (step * step).sum(axis=1)[:, None]
-        self._now[rows] += missing[:, :, None] * along[:, None, :]
+        missing = change - apply(self.slopes[rows], step)
+        share = step / (step * step).sum(axis=1)[:, None]
+        self.slopes[rows] += missing[:, :, None] * share[:, None, :]
+
+    def forget(self, rows: np.ndarray) -> None:
+        """Has them computed where the next step begins."""
+        self._old[rows], self._fresh[rows] = True, False
 
     def renew_or_kill(self, rows: np.ndarray, alive: np.ndarray) -> None:
         """Where no step helps: with a Jacobian of another point that is no verdict yet."""
-        alive[rows[self._exact[rows]]] = False
+        alive[rows[self._fresh[rows]]] = False
         self._old[rows] = True
 
 

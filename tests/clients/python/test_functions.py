@@ -381,6 +381,6 @@ def test_a_cube_is_flat_where_it_is_zero():
 
 def test_solvers_that_fail_elsewhere_accuse_nobody():
     with pytest.raises(stellate.NotConverged):
-        implicit(lambda x: norm2(x) - 1).closest_point(np.zeros((3, 3)))
+        implicit(lambda x: norm2(x) - 1, lambda x: 2 * x).closest_point(np.zeros((3, 3)))
     with pytest.raises(stellate.NotConverged):
         ask(implicit(lambda x: norm2(x) + 1))

@@ -134,7 +134,9 @@ def test_says_which_points_do_not_converge():
         return (x * x).sum(axis=1, keepdims=True) - 1
 
     box = -np.ones(3), np.ones(3)
-    m = stellate.ImplicitManifold(f, ambient_dimension=3, dimension=2, bounding_box=box)
+    m = stellate.ImplicitManifold(
+        f, lambda x: 2 * x, ambient_dimension=3, dimension=2, bounding_box=box
+    )
     with pytest.raises(stellate.NotConverged, match="1 of 3 points") as caught:
         m.closest_point(np.array([[0.5, 0, 0], [0, 0, 0], [0, 0, 3.0]]))
     assert caught.value.converged.tolist() == [True, False, True]
@@ -245,3 +247,56 @@ def test_points_that_creases_are_nearest_to_are_given_up_soon(rng):
     for point, y in zip(x[found], lost.value.points[found]):
         np.testing.assert_array_equal(oracle.closest_point(point[None])[0], y)
     assert asked < 2000, "calls of f, each for a few points, are what a search costs"
+
+
+def found_of(nearest, x, face):
+    """Of points that are far, nearly all."""
+    try:
+        return nearest(x, face)
+    except stellate.NotConverged as error:
+        assert error.converged.mean() > 0.97
+        return error.points[error.converged]
+
+
+def slope_of_bowl(x):
+    return np.column_stack([np.ones(len(x)), 0 * x[:, 1], 0 * x[:, 2], 0.6 * x[:, 3]])
+
+
+@pytest.mark.parametrize("gradient", [None, slope_of_bowl])
+@pytest.mark.parametrize("jacobian", [None, "given"])
+def test_faces_of_equations_are_solved_with_them(gradient, jacobian, rng):
+    """Nearest points of a torus in R^4 where walls are zero: curves, and where two cross, points."""
+
+    def f(x):
+        return np.column_stack([x[:, 0] ** 2 + x[:, 1] ** 2 - 1, x[:, 2] ** 2 + x[:, 3] ** 2 - 1])
+
+    def slopes(x):
+        zero = 0 * x[:, :2]
+        rows = [np.hstack([2 * x[:, :2], zero]), np.hstack([zero, 2 * x[:, 2:]])]
+        return np.stack(rows, axis=1)
+
+    def bowl(x):
+        return x[:, 0] + 0.3 * x[:, 3] ** 2
+
+    m = stellate.ImplicitManifold(
+        f,
+        slopes if jacobian else None,
+        ambient_dimension=4,
+        dimension=2,
+        bounding_box=(-1.5 * np.ones(4), 1.5 * np.ones(4)),
+    )
+    half = stellate.oracles.HalfSpace([0.0, 0.0, 1.0, 0.2])
+    clipped = stellate.oracles.Clipped(m, [bowl, half], gradients=[gradient, None])
+    on = m.closest_point(rng.uniform(-1, 1, (300, 4)))
+    curve = found_of(clipped.face_point, on, (0,))
+    x = curve + rng.uniform(-0.05, 0.05, curve.shape)
+    p = clipped.face_point(x, (0,))
+    assert np.abs(f(p)).max() < 1e-11 and np.abs(bowl(p)).max() < 1e-11
+    across = np.concatenate([slopes(p), slope_of_bowl(p)[:, None]], axis=1)
+    along = np.linalg.svd(across)[2][:, 3]
+    assert np.abs(((x - p) * along).sum(axis=1)).max() < 1e-9
+    parts = [clipped.face_point(part, (0,)) for part in np.split(x, [1, 2, 50])]
+    assert np.concatenate(parts).tobytes() == p.tobytes()
+    corners = found_of(clipped.face_point, p, (0, 1))
+    assert np.abs(f(corners)).max() < 1e-11
+    assert np.abs(clipped.clearances(corners)).max() < 1e-11

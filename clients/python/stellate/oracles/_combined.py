@@ -242,12 +242,15 @@ class LevelSet:
             self.bounding_box = box
 
     def closest_point(self, points: Array) -> Array:
-        """(n, d) -> (n, d): nearest points of the set. Raises: NotConverged, with what was found.
+        """(n, d) -> (n, d): nearest points of the set. Raises: NotConverged, with what was found."""
+        return all_or_raise(*self.find(np.asarray(points, dtype=np.float64)))
+
+    def find(self, x: Array) -> tuple[Array, Flags]:
+        """(n, d) -> nearest points of the set (n, d), and where they were found.
 
         Down to the level and along it towards x, in M's tangent space, and back to M, again and
         again; a step is halved while it oversteps.
         """
-        x = np.asarray(points, dtype=np.float64)
         y, alive = self._base.closest_points(np.ascontiguousarray(x))
         y, found = y.copy(), np.zeros(len(x), dtype=bool)
         damping, last = np.ones(len(x)), np.full(len(x), np.inf)
@@ -276,7 +279,7 @@ class LevelSet:
             there = y[rows] + apply(bases[usable], v)
             y[rows], landed = self._base.closest_points(np.ascontiguousarray(there))
             alive[rows[~landed]] = False
-        return all_or_raise(y, found)
+        return y, found
 
     def tangent_basis(self, points: Array) -> Array:
         """(n, d) -> (n, d, k - m): the directions of M along which f does not change."""

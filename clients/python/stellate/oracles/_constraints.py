@@ -9,8 +9,9 @@ import numpy as np
 
 from .._functions import UserFunction
 from .._rows import Array, Flags, norms
-from ..errors import InvalidArgument, NotConverged
+from ..errors import InvalidArgument
 from ._implicit import ImplicitManifold
+from ._nearest import normal_step
 
 _LOOKS = 64  # points of the box that constraints are looked at from
 # What is left of a gradient across those before it, as a share, where it follows from them; and a
@@ -99,10 +100,7 @@ class ConstraintSet(ImplicitManifold):
                 raise InvalidArgument(
                     f"constraint {number} follows from those before it: leave it out"
                 )
-        try:
-            points, found = self.closest_point(looks), np.ones(len(looks), dtype=bool)
-        except NotConverged as error:
-            points, found = error.points, error.converged
+        points, _, found, _ = self._equations.drive(looks, normal_step)
         if not found.any():
             raise InvalidArgument(
                 f"no point was found where all constraints hold, from {_LOOKS} points of the box"

@@ -9,12 +9,14 @@ from typing import Any, Callable
 import numpy as np
 
 from .._derivatives import Library, with_derivatives
+from .._equations import System, along, differences
 from .._functions import Exactness, UserFunction
-from .._rows import Array, apply, norms, transposed
+from .._rows import Array, Flags, apply, norms, transposed
 from ..errors import InvalidArgument
 from ..oracle import CheckedOracle
 from ._combined import LevelSet
-from ._common import refuse_walls, where_of
+from ._common import all_or_raise, refuse_walls, where_of
+from ._implicit import ImplicitManifold, OnWalls
 from ._units import Before, SlopeBefore, in_units
 
 Wall = Callable[[Array], Any]
@@ -24,6 +26,33 @@ class _Face(LevelSet):
     """The points of a manifold where some walls are zero; a corner is one of dimension 0."""
 
     _least_dimension = 0
+
+
+class _WallEquation(System):
+    """A wall that is zero, beside the equations of a manifold."""
+
+    def __init__(
+        self,
+        value: Callable[[int, Array], Array],
+        gradients: Sequence[UserFunction | None],
+        wall: int,
+        like: System,
+    ) -> None:
+        """`like`: those equations."""
+        d = like.shape[1]
+        super().__init__((1, d), like.scale, like.largest, like.max_iterations)
+        self._value, self._gradient, self._wall = value, gradients[wall], wall
+        self.seen_over = np.full(1, self.difference if self._gradient is None else 0.0)
+
+    def values(self, x: Array) -> Array:
+        """(n, d) -> (n, 1)"""
+        return self._value(self._wall, x)[:, None]
+
+    def slopes(self, x: Array, ways: Array, values: Array | None = None) -> Array:
+        """(n, d) -> (n, 1, r), see System."""
+        if self._gradient is None:
+            return differences(self, x, ways, values)
+        return along(self._gradient(x), ways)
 
 
 class Space:
@@ -126,7 +155,7 @@ class Clipped:
             self.local_size = oracle.local_size
         self.thread_safe = bool(getattr(oracle, "thread_safe", False))
         self.about = self._base.about
-        self._faces: dict[tuple[int, ...], _Face] = {}
+        self._faces: dict[tuple[int, ...], Callable[[Array], tuple[Array, Flags]]] = {}
         box = where_of(self._base)
         self._exactness = [Exactness(self._base.seeds, *box) for _ in self._walls]
 
@@ -141,10 +170,8 @@ class Clipped:
         """(n, d) -> (n, d): nearest points of M where the walls of `face` are zero."""
         solver = self._faces.get(face)
         if solver is None:
-            enough = self._independent(face)
-            walls, slopes = partial(self._values, enough), partial(self._slopes, enough)
-            solver = self._faces[face] = _Face(self._oracle, walls, slopes)
-        return solver.closest_point(points)
+            solver = self._faces[face] = self._solver_of(self._independent(face))
+        return all_or_raise(*solver(np.asarray(points, dtype=np.float64)))
 
     def clearances(self, points: Array) -> Array:
         """(n, d) -> (n, walls): the walls' values."""
@@ -176,6 +203,15 @@ class Clipped:
             while grown := {w for s in self.closures if len(set(s) - zero) == 1 for w in s} - zero:
                 zero |= grown
         return tuple(chosen)
+
+    def _solver_of(self, face: tuple[int, ...]) -> Callable[[Array], tuple[Array, Flags]]:
+        if isinstance(self._oracle, ImplicitManifold):
+            # Walls are equations like the others.
+            return OnWalls(
+                self._oracle,
+                lambda like: [_WallEquation(self._value, self._gradients, w, like) for w in face],
+            ).find
+        return _Face(self._oracle, partial(self._values, face), partial(self._slopes, face)).find
 
     def _values(self, face: tuple[int, ...], points: Array) -> Array:
         """(n, d) -> (n, len(face))"""
