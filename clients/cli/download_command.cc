@@ -1,8 +1,6 @@
 #include "download_command.h"
 
 #include <CLI/CLI.hpp>
-#include <cstdio>
-#include <iostream>
 #include <utility>
 
 #include "progress_bar.h"
@@ -26,9 +24,7 @@ DownloadCommand::DownloadCommand(CLI::App& parent)
       ->check(CLI::PositiveNumber)
       ->excludes(wait);
   server_.AddReconnect(command_);
-  command_->add_option("--report", report_, "file for the report as JSON");
-  command_->add_flag("--json", json_, "print the report as JSON");
-  command_->add_flag("-q,--quiet", quiet_, "no progress and no report");
+  report_.AddTo(command_);
   command_->footer(
       "Exit status: 0 certified, 1 not certified, 2 usage or refused, 3 server or oracle failed.");
 }
@@ -39,7 +35,7 @@ int DownloadCommand::Run(std::stop_token stop) {
   options_.connection = std::move(*connection);
   if (wait_) options_.unfinished = Unfinished::kWait;
   if (unfinished_) options_.unfinished = Unfinished::kTake;
-  ProgressBar bar(quiet_);
+  ProgressBar bar(report_.is_quiet());
   options_.stop = std::move(stop);
   options_.on_progress = [&bar](const Progress& progress) { bar.Show(progress); };
   options_.on_part = [&bar](auto received, auto all) { bar.ShowPart(received, all); };
@@ -53,23 +49,11 @@ int DownloadCommand::Run(std::stop_token stop) {
 }
 
 int DownloadCommand::Deliver(const SavedMesh& mesh) const {
-  int status = mesh.report.certified() ? kExitCertified : kExitNotCertified;
-  for (const Error& failure : mesh.failures) status = PrintError(failure);
-  if (!report_.empty()) {
-    const Expected<void> saved = SaveJson(mesh.report, report_);
-    if (!saved) status = PrintError(saved.error());
-  }
   const bool has_report = mesh.report.termination != Termination::kUnknown;
-  if (json_) {
-    std::cout << ToJson(mesh.report) << "\n";
-  } else if (!quiet_ && has_report) {
-    PrintText(mesh.report.text);
-  } else if (!quiet_) {
-    std::printf("%llu vertices, %llu simplices, not the end of the mesh\n",
-                static_cast<unsigned long long>(mesh.vertices),
-                static_cast<unsigned long long>(mesh.simplices));
-  }
-  return status;
+  const std::string counts = std::to_string(mesh.vertices) + " vertices, " +
+                             std::to_string(mesh.simplices) +
+                             " simplices, not the end of the mesh\n";
+  return report_.Write(mesh.report, has_report ? mesh.report.text : counts, mesh.failures);
 }
 
 }  // namespace stellate::cli

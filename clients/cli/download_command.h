@@ -5,6 +5,7 @@
 #include <string>
 
 #include "outputs.h"
+#include "report_output.h"
 #include "server_options.h"
 #include "stellate/download.h"
 
@@ -25,8 +26,8 @@ class DownloadCommand {
   DownloadOptions options_;
   std::string mesh_;
   Outputs outputs_;
-  std::string report_;
-  bool wait_ = false, unfinished_ = false, json_ = false, quiet_ = false;
+  ReportOutput report_;
+  bool wait_ = false, unfinished_ = false;
 };
 
 }  // namespace stellate::cli

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <cstdio>
 #include <exception>
-#include <iostream>
 #include <memory>
 #include <utility>
 
@@ -39,9 +38,7 @@ MeshCommand::MeshCommand(CLI::App& parent)
   outputs_.AddTo(command_);
   command_->add_flag("--closest-point-only", closest_point_only_,
                      "offer neither flat intersections nor tangent bases");
-  command_->add_option("--report", report_, "file for the report as JSON");
-  command_->add_flag("--json", json_, "print the report as JSON");
-  command_->add_flag("-q,--quiet", quiet_, "no progress and no report");
+  report_.AddTo(command_);
   command_->footer(
       "Exit status: 0 certified, 1 not certified, 2 usage or refused, 3 server or oracle failed.");
 }
@@ -67,17 +64,17 @@ int MeshCommand::Run(std::stop_token stop) {
   ClosestPointOnly poor(oracle);
   const Expected<SavedMesh> mesh =
       MeshIt(closest_point_only_ ? static_cast<Oracle&>(poor) : oracle);
-  if (mesh) return Deliver(*mesh);
+  if (mesh) return report_.Write(mesh->report, mesh->report.text, mesh->failures);
   Error error = mesh.error();
   error.message = InFlags(error.message);
   return PrintError(error);
 }
 
 Expected<SavedMesh> MeshCommand::MeshIt(Oracle& oracle) {
-  ProgressBar bar(quiet_);
+  ProgressBar bar(report_.is_quiet());
   options_.on_epsilon = [this, &bar](double epsilon, const std::string& reason) {
     bar.Clear();
-    if (!quiet_) std::fprintf(stderr, "epsilon %g, %s\n", epsilon, reason.c_str());
+    if (!report_.is_quiet()) std::fprintf(stderr, "epsilon %g, %s\n", epsilon, reason.c_str());
   };
   options_.on_progress = [&bar](const Progress& progress) { bar.Show(progress); };
   options_.on_part = [&bar](auto received, auto all) { bar.ShowPart(received, all); };
@@ -93,21 +90,6 @@ Expected<SavedMesh> MeshCommand::MeshIt(Oracle& oracle) {
     bar.Clear();
     return Fail(ErrorCode::kOracleFailed, e.what());
   }
-}
-
-int MeshCommand::Deliver(const SavedMesh& mesh) const {
-  int status = mesh.report.certified() ? kExitCertified : kExitNotCertified;
-  for (const Error& failure : mesh.failures) status = PrintError(failure);
-  if (!report_.empty()) {
-    const Expected<void> saved = SaveJson(mesh.report, report_);
-    if (!saved) status = PrintError(saved.error());
-  }
-  if (json_) {
-    std::cout << ToJson(mesh.report) << "\n";
-  } else if (!quiet_) {
-    PrintText(mesh.report.text);
-  }
-  return status;
 }
 
 }  // namespace stellate::cli

@@ -6,6 +6,7 @@
 
 #include "oracle_source.h"
 #include "outputs.h"
+#include "report_output.h"
 #include "server_options.h"
 #include "spec_options.h"
 #include "stellate/client.h"
@@ -21,7 +22,6 @@ class MeshCommand {
 
  private:
   Expected<SavedMesh> MeshIt(Oracle& oracle);
-  int Deliver(const SavedMesh& mesh) const;
 
   CLI::App* command_;
   OracleSource source_;
@@ -29,8 +29,8 @@ class MeshCommand {
   SpecOptions spec_;
   MeshOptions& options_ = spec_.options;
   Outputs outputs_;
-  std::string report_;
-  bool json_ = false, quiet_ = false, closest_point_only_ = false;
+  ReportOutput report_;
+  bool closest_point_only_ = false;
 };
 
 }  // namespace stellate::cli

@@ -2,8 +2,6 @@
 
 #include <CLI/CLI.hpp>
 
-#include "server_options.h"
-
 namespace stellate::cli {
 
 CLI::Option* Outputs::AddTo(CLI::App* command) {
@@ -22,11 +20,12 @@ Expected<void> Outputs::Check(int dimension, int ambient_dimension) const {
   return {};
 }
 
-int Outputs::Write(const Mesh& mesh, int status) const {
+std::vector<Error> Outputs::Write(const Mesh& mesh) const {
+  std::vector<Error> failures;
   for (const std::string& path : paths_) {
-    if (const Expected<void> saved = mesh.Save(path); !saved) status = PrintError(saved.error());
+    if (const Expected<void> saved = mesh.Save(path); !saved) failures.push_back(saved.error());
   }
-  return status;
+  return failures;
 }
 
 }  // namespace stellate::cli

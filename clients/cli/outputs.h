@@ -17,9 +17,8 @@ class Outputs {
 
   // What Write would refuse, asked before there is a mesh to lose.
   Expected<void> Check(int dimension, int ambient_dimension) const;
-  // Writes all that can be written, complaining of the others; `status`, or that of the last
-  // complaint.
-  int Write(const Mesh& mesh, int status) const;
+  // Writes all that can be written. Returns why the others cannot.
+  std::vector<Error> Write(const Mesh& mesh) const;
 
   const std::vector<std::string>& paths() const { return paths_; }
 

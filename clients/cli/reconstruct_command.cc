@@ -2,7 +2,6 @@
 
 #include <CLI/CLI.hpp>
 #include <exception>
-#include <iostream>
 #include <utility>
 
 #include "progress_bar.h"
@@ -52,9 +51,7 @@ ReconstructCommand::ReconstructCommand(CLI::App& parent)
       "--steiner", options_.steiner,
       "vertices may be added, after the points, where nothing else makes stars agree");
   server_.AddReconnect(command_);
-  command_->add_option("--report", report_, "file for the report as JSON");
-  command_->add_flag("--json", json_, "print the report as JSON");
-  command_->add_flag("-q,--quiet", quiet_, "no progress and no report");
+  report_.AddTo(command_);
   command_->footer(
       "Exit status: 0 certified, 1 not certified, 2 usage or refused, 3 server failed.");
 }
@@ -74,7 +71,7 @@ int ReconstructCommand::Run(std::stop_token stop) {
   options_.closed = !open_;
   options_.label = "stellate reconstruct";
   options_.stop = std::move(stop);
-  ProgressBar bar(quiet_);
+  ProgressBar bar(report_.is_quiet());
   options_.on_progress = [&bar](const Progress& progress) { bar.Show(progress); };
   options_.connection.on_outage = [this, &bar](const Outage& outage) {
     bar.Clear();
@@ -82,21 +79,8 @@ int ReconstructCommand::Run(std::stop_token stop) {
   };
   const Expected<Mesh> mesh = Reconstruct(points, options_);
   bar.Clear();
-  return mesh ? Deliver(*mesh) : PrintError(mesh.error());
-}
-
-int ReconstructCommand::Deliver(const Mesh& mesh) const {
-  int status = outputs_.Write(mesh, mesh.report.certified() ? kExitCertified : kExitNotCertified);
-  if (!report_.empty()) {
-    const Expected<void> saved = SaveJson(mesh.report, report_);
-    if (!saved) status = PrintError(saved.error());
-  }
-  if (json_) {
-    std::cout << ToJson(mesh.report) << "\n";
-  } else if (!quiet_) {
-    PrintText(mesh.report.text);
-  }
-  return status;
+  if (!mesh) return PrintError(mesh.error());
+  return report_.Write(mesh->report, mesh->report.text, outputs_.Write(*mesh));
 }
 
 }  // namespace stellate::cli

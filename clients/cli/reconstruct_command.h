@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "outputs.h"
+#include "report_output.h"
 #include "server_options.h"
 #include "stellate/reconstruct.h"
 
@@ -19,8 +20,6 @@ class ReconstructCommand {
   int Run(std::stop_token stop);
 
  private:
-  int Deliver(const Mesh& mesh) const;
-
   CLI::App* command_;
   ServerOptions server_;
   ReconstructOptions options_;
@@ -28,8 +27,8 @@ class ReconstructCommand {
   std::optional<int> coordinates_;
   std::vector<std::string> columns_;
   Outputs outputs_;
-  std::string report_;
-  bool open_ = false, json_ = false, quiet_ = false;
+  ReportOutput report_;
+  bool open_ = false;
 };
 
 }  // namespace stellate::cli
