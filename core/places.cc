@@ -54,8 +54,9 @@ const char* PlaceAdvice(Place place) {
              "stays "
              "in doubt, however many points there are";
     case Place::kSparse:
-      return "tangent spaces turn too far from point to point: about 2.3 times as many points are "
-             "needed here";
+      return "the points are too few for how the manifold bends: about 2.3 times as many are "
+             "needed "
+             "here";
     case Place::kClose:
       return "two points are much nearer to each other than the spacing: thin the points, or allow "
              "to drop more of them";

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <atomic>
 #include <cmath>
+#include <span>
 
 #include "core/base/dense.h"
 #include "core/base/parallel.h"
@@ -37,6 +38,12 @@ constexpr double kTurned2 = 0.75;
 // Residuals on two sheets, midway between normal ones, 3, cut short by the fit, and two values, 1.
 constexpr double kTwoSheets = 1.5;
 
+// Tangent spaces at nearest neighbours differ by some 15 and 25 degrees where the spacing is 0.35
+// and 0.6 of M's radius of curvature. Beyond the first, stars may disagree because the points are
+// too few; beyond the second, a quadric does not tell bends of M from outliers. sin^2.
+constexpr double kThin2 = 0.067;
+constexpr double kCoarse2 = 0.1786;
+
 // The cosines between the tangent vectors at two points.
 Eigen::MatrixXd CosinesBetween(const FittedCloud& cloud, std::uint32_t p, std::uint32_t q) {
   Eigen::MatrixXd cosines(cloud.k, cloud.k);
@@ -46,8 +53,14 @@ Eigen::MatrixXd CosinesBetween(const FittedCloud& cloud, std::uint32_t p, std::u
   return cosines;
 }
 
-// Whether the largest angle between two tangent spaces has a squared sine above a bound. The sum of
-// all squared sines, which is soon computed, decides most often.
+// The squared sine of the largest angle between two tangent spaces.
+double Turn2(const FittedCloud& cloud, std::uint32_t p, std::uint32_t q) {
+  const Eigen::MatrixXd cosines = CosinesBetween(cloud, p, q);
+  return 1 - EigenvaluesOfSymmetric(cosines.transpose() * cosines)[0];
+}
+
+// Whether it is above a bound. The sum of all squared sines, which is soon computed, decides most
+// often.
 bool TurnsBy(double sine2, const FittedCloud& cloud, std::uint32_t p, std::uint32_t q) {
   double sum = cloud.k;
   for (int a = 0; a < cloud.k; ++a)
@@ -57,8 +70,32 @@ bool TurnsBy(double sine2, const FittedCloud& cloud, std::uint32_t p, std::uint3
       sum -= cosine * cosine;
     }
   if (!(sum > sine2) || cloud.k == 1) return sum > sine2;
-  const Eigen::MatrixXd cosines = CosinesBetween(cloud, p, q);
-  return 1 - EigenvaluesOfSymmetric(cosines.transpose() * cosines)[0] > sine2;
+  return Turn2(cloud, p, q) > sine2;
+}
+
+// The nearest neighbours of a point: as many as directions.
+std::span<const std::uint32_t> Nearest(const FittedCloud& cloud, std::uint32_t p) {
+  return cloud.Near(p).subspan(
+      1, std::min<std::size_t>(cloud.near_count - 1, static_cast<std::size_t>(2 * cloud.k)));
+}
+
+// By how much tangent spaces turn from one point to the next, as squared sines, where they are
+// those of the given points; 0 where these were smoothed. Medians over the points around, in which
+// the few that an outlier turns do not show.
+std::vector<double> MeasureTurns(const FittedCloud& cloud) {
+  std::vector<double> turns(cloud.size), medians(cloud.size);
+  ParallelFor(cloud.size, [&](std::uint32_t p) {
+    std::vector<double> own;
+    for (const std::uint32_t q : Nearest(cloud, p)) own.push_back(Turn2(cloud, p, q));
+    turns[p] = Median(std::move(own));
+  });
+  ParallelFor(cloud.size, [&](std::uint32_t p) {
+    if (cloud.smoothed[p]) return;
+    std::vector<double> around;
+    for (const std::uint32_t q : cloud.Near(p)) around.push_back(turns[q]);
+    medians[p] = Median(std::move(around));
+  });
+  return medians;
 }
 
 bool HasSheetNear(const FittedCloud& cloud, std::uint32_t p) {
@@ -85,10 +122,13 @@ bool HasSheetNear(const FittedCloud& cloud, std::uint32_t p) {
   return false;
 }
 
-bool IsNoisy(const FittedCloud& cloud, std::uint32_t p) {
-  const double h = cloud.spacing[p];
-  return cloud.noise[p] > kNoisy * h ||
-         cloud.height[p] > std::max(kOutlier * h, kOutlierDeviations * cloud.noise[p]);
+// Whether residuals are larger than those of points near a smooth manifold.
+bool IsUneven(const FittedCloud& cloud, std::uint32_t p) {
+  return cloud.noise[p] > kNoisy * cloud.spacing[p];
+}
+bool IsHigh(const FittedCloud& cloud, std::uint32_t p) {
+  return cloud.height[p] >
+         std::max(kOutlier * cloud.spacing[p], kOutlierDeviations * cloud.noise[p]);
 }
 
 // How high p is over the tangent spaces at its neighbours: the median, length. Unlike that over the
@@ -150,9 +190,7 @@ std::vector<std::uint8_t> FindTurning(const FittedCloud& cloud, const Assembly& 
   // Unresolved places have fewer simplices, or none.
   ParallelFor(cloud.size, [&](std::uint32_t p) {
     if (assembly.places[p] != Place::kDisagree) return;
-    for (const std::uint32_t q : cloud.Near(p).first(
-             std::min<std::size_t>(cloud.near_count, static_cast<std::size_t>(2 * cloud.k) + 1)))
-      test(p, q);
+    for (const std::uint32_t q : Nearest(cloud, p)) test(p, q);
   });
   return turning;
 }
@@ -163,21 +201,31 @@ Causes FindCauses(const FittedCloud& cloud, const Assembly& assembly, bool edges
   const std::vector<std::uint8_t> turning = FindTurning(cloud, assembly);
   const auto& places = assembly.places;
   std::vector<std::uint8_t> beside_outlier(cloud.size);
-  if (std::find(places.begin(), places.end(), Place::kDisagree) != places.end())
+  std::vector<double> turns(cloud.size);
+  if (std::find(places.begin(), places.end(), Place::kDisagree) != places.end()) {
     beside_outlier = FindBesideOutliers(cloud);
+    turns = MeasureTurns(cloud);
+  }
   Causes causes;
   causes.places.assign(cloud.size, Place::kOk);
   ParallelFor(cloud.size, [&](std::uint32_t p) {
     if (assembly.places[p] == Place::kDropped || assembly.places[p] == Place::kAdded) return;
     const bool resolved = assembly.places[p] != Place::kDisagree;
+    // Residuals tell noise from bends only where a quadric is fitted to a small part of M, and
+    // noise does not grow with that part.
+    const bool tells = (cloud.IsLocal(p) || edges_allowed) && !cloud.misfits;
     Place& cause = causes.places[p];
     if (!(assembly.radii[p] <= OpenRadius(cloud, p)) && !(edges_allowed && resolved))
       cause = Place::kEdge;
     else if (HasSheetNear(cloud, p))
       cause = Place::kSheets;
-    else if (IsNoisy(cloud, p) || (!resolved && beside_outlier[p] != 0))
+    else if (IsUneven(cloud, p))
+      cause = tells ? Place::kNoise : Place::kSparse;
+    else if (!resolved && turns[p] > kCoarse2)
+      cause = Place::kSparse;
+    else if (IsHigh(cloud, p) || (!resolved && beside_outlier[p] != 0))
       cause = Place::kNoise;
-    else if (turning[p])
+    else if (turning[p] || (!resolved && turns[p] > kThin2))
       cause = Place::kSparse;
     else if (!resolved)
       cause = cloud.nearest[p] < kClose * cloud.spacing[p] ? Place::kClose : Place::kDisagree;

@@ -126,6 +126,7 @@ class CloudFitter {
     const NeighbourSearch search(cloud_.positions, cloud_.d);
     const int count = Count(kFittedOver);
     cloud_.near_count = static_cast<std::uint32_t>(count);
+    cloud_.smoothed_count = static_cast<std::uint32_t>(Count(SmoothedOver(cloud_.k)));
     cloud_.near.resize(std::size_t{cloud_.size} * cloud_.near_count);
     search.ForEach(
         count, [&] { return NewFit(); },
@@ -192,7 +193,8 @@ class CloudFitter {
       height[p] = fit.step().norm();
     };
     std::vector<double> moved = Smooth(cloud_.positions, note);
-    if (!request_.noise && IsMisfit(noise)) {
+    cloud_.misfits = !request_.noise && IsMisfit(noise);
+    if (cloud_.misfits) {
       std::fill(cloud_.smoothed.begin(), cloud_.smoothed.end(), std::uint8_t{0});
     } else {
       for (std::uint32_t p = 0; p < cloud_.size; ++p) {

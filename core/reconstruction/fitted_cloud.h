@@ -24,14 +24,23 @@ struct FittedCloud {
   std::vector<std::uint8_t> extents;   // directions in which the points extend alike; 0: not known
   std::vector<std::uint8_t> smoothed;  // whether the position is a copy's
   bool any_smoothed = false;
-  std::uint32_t near_count = 0;
-  std::vector<std::uint32_t> near;  // near_count each, nearest first
+  // Whether deviations from quadrics grew with the number of neighbours: M bends, and what looks
+  // like noise is none.
+  bool misfits = false;
+  std::uint32_t near_count = 0;      // neighbours that a quadric was fitted to
+  std::uint32_t smoothed_count = 0;  // and where the position is a copy's
+  std::vector<std::uint32_t> near;   // near_count each, nearest first
 
   const double* Position(std::uint32_t p) const {
     return positions.data() + std::size_t{p} * static_cast<std::size_t>(d);
   }
   const double* Tangent(std::uint32_t p) const {
     return tangents.data() + std::size_t{p} * static_cast<std::size_t>(d * k);
+  }
+  // Whether the quadric around p is fitted to a small part of all points. A sixth of them takes up
+  // 48 degrees on a sphere, the least bent of closed surfaces.
+  bool IsLocal(std::uint32_t p) const {
+    return size >= 6 * (smoothed[p] ? smoothed_count : near_count);
   }
   std::span<const std::uint32_t> Near(std::uint32_t p) const {
     return {near.data() + std::size_t{p} * near_count, near_count};

@@ -139,6 +139,15 @@ class Judge {
     return known_.tangents_given || counts_.looks[spec_.dimension] >= kMostlyRight;
   }
 
+  // Noise, and points that are too few, look like more dimensions than there are.
+  const char* OtherwiseCaused() const {
+    const auto count = [&](Place place) { return counts_.places[static_cast<std::size_t>(place)]; };
+    if (2 * (count(Place::kNoise) + count(Place::kSparse)) < known_.against) return "";
+    return count(Place::kNoise) > count(Place::kSparse)
+               ? "; or less noise, if it is noise that makes them look so"
+               : "; or more points, if these are too few to show the dimension";
+  }
+
   // If most places look of one other dimension, that is the cause of all else.
   std::string OtherDimension() const {
     if (LooksRight()) return "";
@@ -147,7 +156,8 @@ class Judge {
       return Message("they look ", other == 0 ? "more than 4" : Message(other), "-dimensional at ",
                      Brief(100 * counts_.looks[other]),
                      " % of the places. Give the dimension that they have; or, if coordinates are "
-                     "in units of their own, scale them, so that a step counts alike in each");
+                     "in units of their own, scale them, so that a step counts alike in each",
+                     OtherwiseCaused());
     }
     return "";
   }

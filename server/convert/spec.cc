@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/base/message.h"
+#include "core/reconstruction.h"
 #include "server/convert/arrays.h"
 #include "text/printable.h"
 
@@ -155,17 +156,20 @@ Refused ReadSeconds(double value, double standard, double most, const char* fiel
   return Status::Ok();
 }
 
-Refused ReadVertices(std::uint64_t vertices, const char* field, const Config& config,
-                     core::Specification* out) {
+// `added`: vertices that may come besides.
+Refused ReadVertices(std::uint64_t vertices, std::uint64_t added, const char* field,
+                     const Config& config, core::Specification* out) {
   const auto d = std::max<std::uint64_t>(out->ambient_dimension, 1);
   const std::uint64_t room = std::max<std::uint64_t>(config.max_coordinates / d, 1);
   const std::uint64_t most = std::min(config.max_vertices, room);
   out->limits.max_vertices = vertices == 0 ? most : vertices;
-  if (vertices <= most) return Status::Ok();
+  if (vertices <= most && added <= most - vertices) return Status::Ok();
   const bool room_binds = room < config.max_vertices;
   return TooLarge(field, room_binds ? "max-coordinates" : "max-vertices",
                   room_binds ? config.max_coordinates : config.max_vertices,
-                  Message(field, " is ", vertices, " but this server allows ", most, " in ", d,
+                  Message(field, " is ", vertices,
+                          added > 0 ? Message(", and steiner may add ", added, " vertices,") : "",
+                          " but this server allows ", most, " in ", d,
                           " dimensions: ask for fewer, or raise --max-vertices or "
                           "--max-coordinates"));
 }
@@ -173,7 +177,7 @@ Refused ReadVertices(std::uint64_t vertices, const char* field, const Config& co
 Refused ReadLimits(const v1::MeshSpec& spec, const Config& config, core::Specification* out) {
   const v1::MeshLimits& limits = spec.limits();
   core::Limits& to = out->limits;
-  Refused refused = ReadVertices(limits.max_vertices(), "limits.max_vertices", config, out);
+  Refused refused = ReadVertices(limits.max_vertices(), 0, "limits.max_vertices", config, out);
   if (!refused.ok()) return refused;
   to.max_batch_queries = limits.max_batch_queries();
   to.max_rounds = limits.max_rounds() == 0 ? config.max_rounds : limits.max_rounds();
@@ -278,7 +282,10 @@ Refused ReadRegionNames(const v1::MeshSpec& spec, std::vector<std::string>* name
 Refused ReadCommon(const v1::Reconstruction& spec, const Config& config, MeshRequest* out) {
   out->label = spec.label();
   Refused refused = ReadDimensions(spec, config, &out->spec);
-  if (refused.ok()) refused = ReadVertices(spec.points(), "points", config, &out->spec);
+  core::ReconstructionSpecification adding;
+  adding.steiner = spec.steiner();
+  const std::uint64_t points = spec.points(), added = core::MostAdded(adding, points);
+  if (refused.ok()) refused = ReadVertices(points, added, "points", config, &out->spec);
   if (refused.ok()) refused = ReadTimeouts(spec.limits(), config, &out->timeouts);
   if (refused.ok()) refused = CheckLabel(out->label);
   return refused;

@@ -8,7 +8,7 @@ import numpy as np
 
 from ._locate import Located
 from ._mesh import FinishedMesh
-from ._points import Noise
+from ._points import Noise, Weights
 from ._reconstruct import reconstruct
 from .client import Client
 from .errors import FailedPrecondition, InvalidArgument
@@ -16,7 +16,7 @@ from .server import Server
 
 __all__ = ["Located", "Reconstructor"]
 
-_PARAMETERS = ("dimension", "noise", "reach", "drop", "closed", "server")
+_PARAMETERS = ("dimension", "noise", "reach", "drop", "closed", "weights", "steiner", "server")
 
 
 class Reconstructor:
@@ -29,8 +29,9 @@ class Reconstructor:
     Args are those of stellate.reconstruct. It goes into sklearn.base.clone and searches of parameters;
     scikit-learn itself is not needed.
 
-    After `fit` it has `mesh_`, a FinishedMesh; row i of its `points` is row i of X; `places_`, (n,) str,
-    what became of each point; and `n_features_in_`, which is d.
+    After `fit` it has `mesh_`, a FinishedMesh; row i of its `points` is row i of X, and those that
+    `steiner` added come last; `places_`, (n,) str, what became of each row of X; and `n_features_in_`,
+    which is d.
     """
 
     mesh_: FinishedMesh
@@ -45,10 +46,13 @@ class Reconstructor:
         reach: float | None = None,
         drop: float = 0.001,
         closed: bool = True,
+        weights: Weights = "auto",
+        steiner: bool = False,
         server: str | Server | Client | None = None,
     ) -> None:
         self.dimension, self.noise, self.reach = dimension, noise, reach
-        self.drop, self.closed, self.server = drop, closed, server
+        self.drop, self.closed, self.weights = drop, closed, weights
+        self.steiner, self.server = steiner, server
 
     def fit(self, X: Any, y: object = None) -> Reconstructor:  # noqa: N803
         """Makes the mesh of the rows of X, (n, d); y is not looked at.
@@ -58,7 +62,7 @@ class Reconstructor:
         mesh = reconstruct(X, **self.get_params())
         if mesh.places is None:
             raise FailedPrecondition("the server says of no point what became of it")
-        self.mesh_, self.places_ = mesh, mesh.places
+        self.mesh_, self.places_ = mesh, mesh.places[: len(X)]
         self.n_features_in_ = mesh.ambient_dimension
         return self
 
@@ -70,16 +74,19 @@ class Reconstructor:
         """Values at the rows of X, by those at the mesh's points.
 
         Args:
-          values: (n,) or (n, m) numbers, a row for each point of the mesh.
+          values: (n,) or (n, m) numbers, a row for each row of X that was fitted. Vertices that were
+            added get the harmonic values between those around.
           X: (q, d)
 
         Returns: (q,) or (q, m): linear on each simplex, at the nearest point of the mesh.
         """
         mesh, at = self._mesh(), np.asarray(values, dtype=np.float64)
-        if at.ndim not in (1, 2) or len(at) != len(mesh.points):
+        if at.ndim not in (1, 2) or len(at) != len(self.places_):
             raise InvalidArgument(
-                f"values have the shape {at.shape}, and the mesh has {len(mesh.points)} points"
+                f"values have the shape {at.shape}, and {len(self.places_)} points were fitted"
             )
+        if len(mesh.points) > len(at):
+            at = _extended(mesh, at)
         found = mesh.locate(X)
         return np.einsum("qc,qc...->q...", found.weights, at[mesh.simplices[found.simplices]])
 
@@ -103,3 +110,12 @@ class Reconstructor:
         if not hasattr(self, "mesh_"):
             raise FailedPrecondition("this Reconstructor has no mesh yet: call fit(X)")
         return self.mesh_
+
+
+def _extended(mesh: FinishedMesh, values: np.ndarray) -> np.ndarray:
+    """Values at the first of the mesh's points, and harmonic ones at the others."""
+    from scipy.sparse.linalg import spsolve
+
+    stiffness, n = mesh.laplacian()[0].tocsr(), len(values)
+    added = spsolve(stiffness[n:, n:].tocsc(), -(stiffness[n:, :n] @ values))
+    return np.concatenate([values, np.asarray(added).reshape(-1, *values.shape[1:])])

@@ -322,7 +322,7 @@ def mesh_of(talk, client, checked):
     client.delete(name)
 
 
-def test_hostile_specifications_are_refused_before_a_point(talk, torus):
+def test_hostile_specifications_are_refused_before_a_point(talk, client, torus):
     good = declared(torus).spec
 
     def refused(**fields):
@@ -352,6 +352,10 @@ def test_hostile_specifications_are_refused_before_a_point(talk, torus):
         error = refused(points=n)
         assert error.code() is grpc.StatusCode.RESOURCE_EXHAUSTED
         assert str(n) in error.details() and "--max-vertices" in error.details()
+    # Vertices that may be added count.
+    error = refused(points=client.info().max_vertices, steiner=True)
+    assert error.code() is grpc.StatusCode.RESOURCE_EXHAUSTED
+    assert "steiner may add" in error.details() and "--max-vertices" in error.details()
 
 
 def test_a_row_that_is_wrong_is_named_and_the_rest_goes_on(talk, client, torus):
@@ -512,6 +516,25 @@ def test_an_estimator(torus, server):
     assert surface.interpolate(torus[:, 2], off) == pytest.approx(found.points[:, 2])
     with pytest.raises(stellate.InvalidArgument, match="3000 points|values have the shape"):
         surface.interpolate(torus[:7, 2], off)
+
+
+def test_an_estimator_whose_mesh_has_vertices_that_were_added(server):
+    points = samples.random_torus(300)
+    surface = stellate.learning.Reconstructor(drop=0, steiner=True, server=server).fit(points)
+    added = len(surface.mesh_.points) - len(points)
+    assert added > 0 and len(surface.places_) == len(points)
+    assert "ADDED" not in surface.places_
+    # Harmonic values are between those around.
+    heights = surface.interpolate(points[:, 2], surface.mesh_.points[-added:])
+    assert np.abs(heights - surface.mesh_.points[-added:, 2]).max() < 0.2
+    both = surface.interpolate(points[:, 1:], points)
+    used = np.isin(np.arange(len(points)), surface.mesh_.simplices)
+    assert both.shape == (300, 2) and np.abs(both - points[:, 1:])[used].max() < 1e-12
+
+
+def test_an_estimator_by_weights_alone(torus, server):
+    surface = stellate.learning.Reconstructor(noise=0, weights="only", server=server).fit(torus)
+    assert set(surface.places_) <= {"OK", "WEIGHTED"} and surface.mesh_.certified
 
 
 def test_an_estimator_is_cloned_by_its_parameters():
