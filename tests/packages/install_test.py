@@ -1,4 +1,4 @@
-"""The gem and the npm package: each built, installed from its file into an empty place with
+"""The gem, the npm package and the crate: each built, installed from its file into an empty place with
 nothing of the source tree within reach, and the first example of its README run there."""
 
 from __future__ import annotations
@@ -9,10 +9,12 @@ import re
 import shutil
 import subprocess
 import sys
+import tarfile
 import tempfile
 import unittest
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+VERSION = (ROOT / "VERSION").read_text().strip()
 STELLATED = os.environ["STELLATED"]
 
 
@@ -80,6 +82,21 @@ class Installed(unittest.TestCase):
         self.run_in("npm", "install", "--no-audit", "--no-fund", "--silent", file)
         (self.place / "torus.mjs").write_text(first_block("node"))
         self.run_in("node", "torus.mjs")
+        self.holds_a_mesh()
+
+    def test_crate(self) -> None:
+        file = self.built("crate", "cargo")
+        with tarfile.open(file) as archive:
+            archive.extractall(self.folder)
+        package = self.folder / f"stellate-{VERSION}"
+        (self.place / "src").mkdir()
+        (self.place / "src" / "main.rs").write_text(first_block("rust"))
+        (self.place / "Cargo.toml").write_text(
+            f'[package]\nname = "user"\nversion = "1.0.0"\nedition = "2021"\n\n'
+            f'[dependencies]\nstellate = {{ path = "{package}" }}\n'
+        )
+        shutil.copy(package / "Cargo.lock", self.place)  # the versions that are tested
+        self.run_in("cargo", "run", "--quiet", "--release")
         self.holds_a_mesh()
 
 
