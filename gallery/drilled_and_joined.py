@@ -10,7 +10,7 @@ from stellate import solids as s
 
 block = s.Box([-1] * 3, [1] * 3) & s.Ball(1.3)
 part = block - s.Cylinder(0.5, axis="x") | s.Ball(0.45, at=(0.95, 0.9, 0.2))
-mesh = stellate.mesh(part, epsilon=0.14)
+mesh = stellate.mesh(part, epsilon=0.13)
 
 skin = mesh.boundary_mesh()
 walls = np.bitwise_and.reduce(mesh.walls[skin.simplices], axis=1)

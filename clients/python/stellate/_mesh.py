@@ -100,7 +100,8 @@ class Mesh:
     @property
     def boundary(self) -> tuple[Face, ...]:
         """The boundary's parts, one for each wall: simplices of dimension k - 1. Of the boundary alone
-        all of it, wall by wall, what is between regions too."""
+        all of it, wall by wall, what is between regions too. A simplex whose vertices all lie on an edge,
+        as in a hole that epsilon is as large as, is in a part of the edge's walls."""
         if self.is_boundary:
             return self.faces(self.dimension)
         return _faces.faces(self.simplices, self.walls, self.dimension - 1)
