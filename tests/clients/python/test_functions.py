@@ -132,10 +132,10 @@ def test_a_function_of_one_point_is_told_how_it_is_called(taker):
     def one_point(x):
         return float(x[0]) ** 2 + float(x[1]) ** 2 + float(x[2]) ** 2 - 1
 
-    with pytest.raises(TypeError, match=r"called with a whole batch .*\(n, 3\).*returns \(n"):
+    with pytest.raises(TypeError, match=r"called with a whole batch, .*\(n, 3\).*returns \(n"):
         ask(make(one_point))
     kinds = (stellate.OracleError, IndexError)  # by how many points the first batch has
-    with pytest.raises(kinds, match=r"called with a whole batch .*\(n, 3\)"):
+    with pytest.raises(kinds, match=r"called with a whole batch, .*\(n, 3\)"):
         ask(make(lambda x: x[0] ** 2 + x[1] ** 2 + x[2] ** 2 - 1))
 
 
