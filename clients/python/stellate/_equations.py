@@ -19,9 +19,15 @@ _CENTRAL_STEP = 6e-6  # of central differences: about the cube root of the round
 _SECOND_STEP = 1e-4  # of second differences: about its fourth root
 _HALVED = 12  # times at most, as a step is
 _SLOW = 0.25  # a Jacobian that lowers |F| by less than that is too old
+_FAR = (
+    0.02  # of the box: a step so long leads where the Jacobian is another, or to another way down
+)
 _STILL, _STOPS = 0.99, 2  # so many steps that leave more than that of |F|, and it is least there
 _SHRINKS = 1e-3  # of a step, at the least what the next one is taken to be
 _AHEAD = 1e-3  # of the tolerance: so short, that one need not be looked for
+# What F may be, in its steepness times the step that is to make it zero: corrections of a Jacobian without
+# full rank, as of walls that never meet, grow beyond all bounds, and steps by them shrink to nothing.
+_OUT_OF_STEP = 10
 
 Batched = Callable[[np.ndarray], np.ndarray]
 # (jacobian (n, m, r), values (n, m), rows (n,) of the batch) -> steps (n, r), in what is solved for
@@ -33,6 +39,7 @@ class Solution(NamedTuple):
     values: np.ndarray  # (n, m), of F there; 0 where that goes without saying
     converged: np.ndarray  # (n,)
     slopes: np.ndarray  # (n, m, d), the Jacobian as far as it is known on the way
+    steepness: np.ndarray  # (n, m), the lengths of its rows where it was last computed
 
 
 class System:
@@ -134,6 +141,7 @@ class System:
         ways: np.ndarray | None = None,
         enough: float = 0.0,
         came: np.ndarray | None = None,
+        steepness: np.ndarray | None = None,
     ) -> Solution:
         """Drives F to zero from each row of `start`; steps are halved until |F| falls.
 
@@ -146,6 +154,7 @@ class System:
           ways: (n, d, r), the directions to move in; None: all.
           enough: of |F| at the start, where less than that will do.
           came: (n,), how long the step to `start` was, if these are the last ones of a way.
+          steepness: that of a Solution which `slopes` come from; None: theirs.
         """
         y = np.array(start, dtype=float)
         values = self.values(y)
@@ -153,7 +162,7 @@ class System:
         converged = np.zeros(len(y), dtype=bool)
         last = np.full(len(y), np.nan) if came is None else came.copy()
         near, stills = enough * norms(values), np.zeros(len(y), dtype=int)
-        shared = _Shared(self, y, values, slopes, ways)
+        shared = _Shared(self, y, values, slopes, ways, steepness)
         for _ in range(min(most or self.max_iterations, self.max_iterations)):
             rows = np.flatnonzero(alive & ~converged)
             if not rows.size:
@@ -165,6 +174,9 @@ class System:
             length = norms(step)
             # A step this short lands on M to rounding; halving could only see noise.
             short = length <= self.tolerance * 1e4
+            led = short & ~shared.explains(rows, length)
+            shared.renew_or_kill(rows[led], alive)
+            rows, step, length, short = rows[~led], step[~led], length[~led], short[~led]
             with np.errstate(invalid="ignore", divide="ignore"):
                 shrinks = length / last[rows]
                 ahead = length * np.maximum(shrinks, _SHRINKS) <= _AHEAD * self.tolerance
@@ -184,7 +196,7 @@ class System:
             alive &= stills < _STOPS
             if enough > 0:
                 converged |= alive & (norms(values) <= near)
-        return Solution(y, values, converged, shared.slopes)
+        return Solution(y, values, converged, shared.slopes, shared.steepness)
 
     def _halve_until_better(
         self,
@@ -207,6 +219,7 @@ class System:
                 better = trial_size <= (1 - 1e-4 * fraction) * size
             taken = rows[better]
             slow = (trial_size > _SLOW * size)[better]
+            slow |= norms(fraction * step[better]) > _FAR * self.scale
             change = trial_values[better] - values[taken]
             shared.moved(taken, fraction * step[better], change, slow)
             y[taken], values[taken] = trial[better], trial_values[better]
@@ -329,6 +342,7 @@ class _Shared:
         values: np.ndarray,
         near: np.ndarray | None,
         ways: np.ndarray | None,
+        steepness: np.ndarray | None,
     ) -> None:
         self._system, self._y, self._values, self._ways = system, y, values, ways
         m, d = system.shape
@@ -337,6 +351,7 @@ class _Shared:
         self.slopes = np.zeros((len(y), m, d if ways is None else ways.shape[2]))
         if near is not None:
             self.slopes[:] = near
+        self.steepness = norms(self.slopes) if steepness is None else steepness.copy()
 
     def at(self, rows: np.ndarray) -> np.ndarray:
         old = rows[self._old[rows]]
@@ -344,7 +359,13 @@ class _Shared:
             ways = np.eye(self._y.shape[1]) if self._ways is None else self._ways[old]
             self.slopes[old] = self._system.slopes(self._y[old], ways, self._values[old])
             self._old[old], self._fresh[old] = False, True
+            self.steepness[old] = norms(self.slopes[old])
         return self.slopes[rows]
+
+    def explains(self, rows: np.ndarray, length: np.ndarray) -> np.ndarray:
+        """Whether steps as short as that may lead to zero, if F is as steep as it was seen to be."""
+        most = _OUT_OF_STEP * self.steepness[rows] * length[:, None]
+        return (np.abs(self._values[rows]) <= most).all(axis=1)
 
     def across(self, rows: np.ndarray, step: np.ndarray) -> np.ndarray:
         """Steps (n, r) in the ways that are open, as vectors (n, d)."""

@@ -1,5 +1,7 @@
 """Manifolds by equations, held to the laws of an oracle, and the ready-made ones with them."""
 
+import itertools
+
 import numpy as np
 import pytest
 import stellate
@@ -300,3 +302,61 @@ def test_faces_of_equations_are_solved_with_them(gradient, jacobian, rng):
     corners = found_of(clipped.face_point, p, (0, 1))
     assert np.abs(f(corners)).max() < 1e-11
     assert np.abs(clipped.clearances(corners)).max() < 1e-11
+
+
+def cubic(x):
+    return (x[:, 2] - x[:, 0] ** 3 + x[:, 0])[:, None]
+
+
+CUT = {
+    "cubic": (cubic, 3),
+    "torus": (lambda x: ((np.hypot(x[:, 0], x[:, 1]) - 1) ** 2 + x[:, 2] ** 2 - 0.16)[:, None], 3),
+    "S^3": (lambda x: (x * x).sum(axis=1, keepdims=True) - 1, 4),
+    "T^2": (lambda x: np.stack([(x[:, i : i + 2] ** 2).sum(axis=1) - 1 for i in (0, 2)], 1), 4),
+    "steep": (lambda x: np.tanh(50 * ((x * x).sum(axis=1, keepdims=True) - 1)), 3),
+}
+
+
+@pytest.mark.parametrize("name", CUT)
+def test_what_is_found_on_walls_is_on_them(name, rng):
+    """Walls that never meet on M among them: their equations have no Jacobian of full rank there."""
+    f, d = CUT[name]
+    m = len(f(np.zeros((1, d)))[0])
+    whole = stellate.ImplicitManifold(
+        f, ambient_dimension=d, dimension=d - m, bounding_box=([-1.4] * d, [1.4] * d)
+    )
+    walls = [lambda x, i=i, s=s: s * x[:, i] + 0.7 for i in range(d) for s in (1, -1)]
+    cut = stellate.oracles.Clipped(whole, walls)
+    points, total = rng.uniform(-1.4, 1.4, (30, d)), 0
+    for count in range(1, min(d - m, 2) + 1):
+        for face in itertools.combinations(range(2 * d), count):
+            try:
+                y = cut.face_point(points, face)
+            except stellate.NotConverged as error:
+                y = error.points[error.converged]
+            values = np.column_stack([f(y), *(walls[wall](y) for wall in face)])
+            assert np.abs(values).max(initial=0) < 1e-9, face
+            total += len(y)
+    assert total >= 10
+
+
+def test_more_walls_than_dimensions_are_refused():
+    cut = stellate.oracles.Clipped(
+        stellate.ImplicitManifold(
+            cubic, ambient_dimension=3, dimension=2, bounding_box=([-1.4] * 3, [1.4] * 3)
+        ),
+        [lambda x, i=i: x[:, i] for i in range(3)],
+    )
+    with pytest.raises(stellate.InvalidArgument, match="3 equations on a manifold of dimension 2"):
+        cut.face_point(np.zeros((1, 3)), (0, 1, 2))
+
+
+@pytest.mark.parametrize("axes", [(1.0, 1.0, 3.0), (1.0, 1.0, 0.3)])
+def test_feet_are_the_nearest_up_to_where_two_are_as_near(axes, rng):
+    ellipsoid = manifolds.ellipsoid(axes)
+    lower, upper = ellipsoid.bounding_box
+    p = ellipsoid.closest_point(rng.uniform(lower, upper, (1000, 3)))
+    normals = p / np.square(axes)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    inside = p - 0.99 * ellipsoid.local_size(p)[:, None] * normals
+    assert np.abs(ellipsoid.closest_point(inside) - p).max() < 1e-6

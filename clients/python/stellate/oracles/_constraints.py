@@ -100,7 +100,7 @@ class ConstraintSet(ImplicitManifold):
                 raise InvalidArgument(
                     f"constraint {number} follows from those before it: leave it out"
                 )
-        points, _, found, _ = self._equations.drive(looks, normal_step)
+        points, _, found = self._equations.drive(looks, normal_step)[:3]
         if not found.any():
             raise InvalidArgument(
                 f"no point was found where all constraints hold, from {_LOOKS} points of the box"

@@ -202,7 +202,7 @@ class ImplicitManifold:
                 "where f is defined, and in its unit?",
                 "ORACLE_NOT_FINITE",
             )
-        y, values, _, _ = self._equations.drive(starts, normal_step)
+        y, values = self._equations.drive(starts, normal_step)[:2]
         usable = np.isfinite(values).all(axis=1)
         least = np.abs(values) <= _ZERO * np.nanmedian(before, axis=0)
         if not usable.any() or not least[usable].all(axis=1).mean() > 0.5:
@@ -234,8 +234,8 @@ class ImplicitManifold:
         def step_in_flat(slopes: np.ndarray, values: np.ndarray, rows: np.ndarray) -> np.ndarray:
             return -solve(slopes, values[..., None])[..., 0]
 
-        y, _, converged, _ = self._equations.drive(start, step_in_flat, ways=across)
-        return y, converged
+        met = self._equations.drive(start, step_in_flat, ways=across)
+        return met.points, met.converged
 
 
 class OnWalls:
@@ -250,7 +250,12 @@ class OnWalls:
     ) -> None:
         self._whole = manifold._nearest
         equations = manifold._equations
-        self._nearest = Nearest(Together([equations, *walls(equations)]))
+        more = walls(equations)
+        if len(more) > manifold.dimension:
+            raise InvalidArgument(
+                f"{len(more)} equations on a manifold of dimension {manifold.dimension} leave none"
+            )
+        self._nearest = Nearest(Together([equations, *more]))
 
     def find(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(n, d) -> the nearest points (n, d), and where they were found."""

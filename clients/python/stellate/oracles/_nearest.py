@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .._equations import System, solve
+from .._equations import Solution, System, solve
 from .._rows import apply, norms, product, transposed
 
 _CLOSE = 1e-4  # of |F| where we begin, from where steps go down to M and along it at once
@@ -46,12 +46,14 @@ class Nearest:
         """(n, d) -> the nearest points (n, d), and where they were found. `start`: not from x itself."""
         start = x if start is None else start
         if self.dimension == 0:
-            return self._system.drive(start, normal_step)[::2]
+            landed = self._system.drive(start, normal_step)
+            return landed.points, landed.converged
         if self._system.tolerance > _COARSE * self._system.scale:
             return self._watch(x, start)
-        y, values, found, jacobian = self._system.drive(start, normal_step, enough=_CLOSE)
+        begun = self._system.drive(start, normal_step, enough=_CLOSE)
+        y, found = begun.points, begun.converged
         near = np.flatnonzero(found)
-        walk = _Walk(self._system, x[near], y[near], values[near], jacobian[near])
+        walk = _Walk(self._system, x[near], Solution(*(part[near] for part in begun)))
         walked, arrived = walk.to_its_end()
         y[near[arrived]] = walked[arrived]
         far = near[~arrived]
@@ -60,7 +62,7 @@ class Nearest:
 
     def _watch(self, x: np.ndarray, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """First down to M, then along it, by steps that bring it nearer to x, or are halved until they do."""
-        y, values, converged, _ = self._system.drive(y, normal_step)
+        y, values, converged = self._system.drive(y, normal_step)[:3]
         done, pace = ~converged, _Pace(len(y))
         scale = self._system.scale
         for iteration in range(self._system.max_iterations):
@@ -74,9 +76,9 @@ class Nearest:
                 done[active[slow]], converged[active[slow]] = True, False
                 continue
             arrived = length <= max(_ARRIVED * scale, self._system.tolerance)
-            there, there_values, landed, _ = self._system.drive(
+            there, there_values, landed = self._system.drive(
                 here + step, normal_step, jacobian, _LANDING
-            )
+            )[:3]
             before, after = norms(here - to), norms(there - to)
             # Near the minimum distances no longer tell better from worse.
             hidden = length <= np.sqrt(self._system.tolerance * scale)
@@ -153,13 +155,12 @@ class _Walk:
     space is known as exactly; across M the Jacobian is corrected by what steps see (Broyden).
     """
 
-    def __init__(
-        self, system: System, x: np.ndarray, y: np.ndarray, values: np.ndarray, jacobian: np.ndarray
-    ) -> None:
-        """`jacobian`: (n, m, d), of points near y."""
+    def __init__(self, system: System, x: np.ndarray, begun: Solution) -> None:
+        """`begun`: the way to each x so far, of which all are near M."""
         (m, d), n = system.shape, len(x)
-        self._system, self._k = system, d - m
-        self._x, self._y, self._values, self._jacobian = x, y.copy(), values.copy(), jacobian.copy()
+        self._system, self._k, self._x = system, d - m, x
+        self._y, self._values = begun.points.copy(), begun.values.copy()
+        self._jacobian, self._steepness = begun.slopes.copy(), begun.steepness
         self._frames = np.empty((n, d, self._k))  # that the bends are of
         self._bends = np.empty((n, m, self._k, self._k))
         self._last = np.full(n, np.inf)  # length of a step
@@ -267,7 +268,11 @@ class _Walk:
     def _land(self, arrived: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         rows = np.flatnonzero(arrived)
         landed = self._system.drive(
-            self._y[rows], normal_step, self._jacobian[rows], came=self._last[rows]
+            self._y[rows],
+            normal_step,
+            self._jacobian[rows],
+            came=self._last[rows],
+            steepness=self._steepness[rows],
         )
         self._y[rows], arrived[rows] = landed.points, landed.converged
         return self._y, arrived
