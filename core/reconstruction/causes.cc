@@ -208,27 +208,24 @@ Causes FindCauses(const FittedCloud& cloud, const Assembly& assembly, bool edges
   }
   Causes causes;
   causes.places.assign(cloud.size, Place::kOk);
-  ParallelFor(cloud.size, [&](std::uint32_t p) {
-    if (assembly.places[p] == Place::kDropped || assembly.places[p] == Place::kAdded) return;
+  const auto cause_at = [&](std::uint32_t p) {
     const bool resolved = assembly.places[p] != Place::kDisagree;
     // Residuals tell noise from bends only where a quadric is fitted to a small part of M, and
     // noise does not grow with that part.
     const bool tells = (cloud.IsLocal(p) || edges_allowed) && !cloud.misfits;
-    Place& cause = causes.places[p];
     if (!(assembly.radii[p] <= OpenRadius(cloud, p)) && !(edges_allowed && resolved))
-      cause = Place::kEdge;
-    else if (HasSheetNear(cloud, p))
-      cause = Place::kSheets;
-    else if (IsUneven(cloud, p))
-      cause = tells ? Place::kNoise : Place::kSparse;
-    else if (!resolved && turns[p] > kCoarse2)
-      cause = Place::kSparse;
-    else if (IsHigh(cloud, p) || (!resolved && beside_outlier[p] != 0))
-      cause = Place::kNoise;
-    else if (turning[p] || (!resolved && turns[p] > kThin2))
-      cause = Place::kSparse;
-    else if (!resolved)
-      cause = cloud.nearest[p] < kClose * cloud.spacing[p] ? Place::kClose : Place::kDisagree;
+      return Place::kEdge;
+    if (HasSheetNear(cloud, p)) return Place::kSheets;
+    if (IsUneven(cloud, p)) return tells ? Place::kNoise : Place::kSparse;
+    if (!resolved && turns[p] > kCoarse2) return Place::kSparse;
+    if (IsHigh(cloud, p) || (!resolved && beside_outlier[p] != 0)) return Place::kNoise;
+    if (turning[p] || (!resolved && turns[p] > kThin2)) return Place::kSparse;
+    if (resolved) return Place::kOk;
+    return cloud.nearest[p] < kClose * cloud.spacing[p] ? Place::kClose : Place::kDisagree;
+  };
+  ParallelFor(cloud.size, [&](std::uint32_t p) {
+    if (assembly.places[p] != Place::kDropped && assembly.places[p] != Place::kAdded)
+      causes.places[p] = cause_at(p);
   });
   for (const Place cause : causes.places) causes.count += cause != Place::kOk;
   return causes;

@@ -36,7 +36,7 @@ class ExpressionError : public std::invalid_argument {
   int column_;
 };
 
-std::string Quoted(std::string_view text) { return "'" + std::string(text) + "'"; }
+std::string Quoted(std::string_view text) { return std::string("'").append(text).append("'"); }
 
 // An argument: a number, a point, a solid, or a word such as x.
 struct Argument {
