@@ -357,9 +357,8 @@ class Run:
         assert report is not None
         self._ended = True
         # Where places in words have to be found among the points, the mesh is taken whole.
-        by_points = self._places.known or self._where_it_ends is not None
         try:
-            if report.certified or not by_points:
+            if report.certified or not self._places.known:
                 nowhere = Mesh(np.empty((0, self._d)), np.empty((0, info.dimension + 1), np.int64))
                 told = self._told(with_report(nowhere, report))
                 final = dataclasses.replace(info, report=told.report)

@@ -170,6 +170,42 @@ def test_values_that_are_not_numbers_spoil_their_own_points_alone(rng):
     assert caught.value.converged.tolist() == [True, False]
 
 
+def upper_half(x):
+    """z = sqrt(1 - x^2 - y^2), which ends with the root."""
+    with np.errstate(invalid="ignore"):
+        return x[:, 2] - np.sqrt(1 - x[:, 0] ** 2 - x[:, 1] ** 2)
+
+
+def slope_of_upper_half(x):
+    with np.errstate(invalid="ignore"):
+        root = np.sqrt(1 - x[:, 0] ** 2 - x[:, 1] ** 2)
+    return np.stack([x[:, 0] / root, x[:, 1] / root, np.ones(len(x))], axis=1)
+
+
+def test_a_manifold_ends_where_its_function_does(rng):
+    box = -2 * np.ones(3), 2 * np.ones(3)
+
+    def half(jacobian=None):
+        return stellate.ImplicitManifold(
+            upper_half, jacobian, ambient_dimension=3, dimension=2, bounding_box=box
+        )
+
+    def at(z):
+        angles = rng.uniform(0, 2 * np.pi, 20)
+        r = np.sqrt(1 - z * z)
+        return np.stack([r * np.cos(angles), r * np.sin(angles), np.full(20, z)], axis=1)
+
+    with_slopes = half(slope_of_upper_half)
+    with_slopes.tangent_basis(at(0.3))
+    assert with_slopes.where_it_ends() == ""
+    with_slopes.tangent_basis(at(0.005))
+    assert "ends where f does, near" in with_slopes.where_it_ends()
+    # Differences look beyond the end by themselves, and know no tangent space there.
+    assert half().tangent_basis(at(0.3)).shape == (20, 3, 2)
+    with pytest.raises(stellate.OracleError, match="ends where f does.*inequalities"):
+        half().tangent_basis(np.concatenate([at(0.3), at(0.005)]))
+
+
 @pytest.mark.parametrize("offset", [0.0, 1e6, -1e7])
 @pytest.mark.parametrize("radius", [1.0, 1e-8, 1e8])
 @pytest.mark.filterwarnings("error")

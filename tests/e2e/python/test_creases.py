@@ -99,3 +99,27 @@ def test_edges_of_a_maximum_are_named_at_any_epsilon(f, epsilon, server):
     verdict = stellate.mesh(oracle, epsilon, server=server).report.certificate.verdict
     assert "smaller epsilon" not in verdict
     assert off_the_edge(f, place(verdict, "has a crease")) < 1e-3, verdict
+
+
+def test_a_root_ends_on_the_manifold(server):
+    def f(x):
+        with np.errstate(invalid="ignore"):
+            return x[:, 2] - np.sqrt(1 - x[:, 0] ** 2 - x[:, 1] ** 2)
+
+    def slope(x):
+        with np.errstate(invalid="ignore"):
+            root = np.sqrt(1 - x[:, 0] ** 2 - x[:, 1] ** 2)
+        return np.stack([x[:, 0] / root, x[:, 1] / root, np.ones(len(x))], axis=1)
+
+    def half(*slopes, **more):
+        space = {"ambient_dimension": 3, "dimension": 2, "bounding_box": ([-2] * 3, [2] * 3)}
+        return stellate.ImplicitManifold(f, *slopes, **space, **more)
+
+    mesh = stellate.mesh(half(slope), 0.3, server=server)
+    assert not mesh.report.certified
+    verdict = mesh.report.certificate.verdict
+    assert "ends where f does, near" in verdict and "cut it by a wall" in verdict, verdict
+    with pytest.raises(stellate.OracleError, match="ends where f does"):
+        stellate.mesh(half(), 0.3, server=server)
+    cut = half(inequalities=[lambda x: x[:, 2] - 0.3])
+    assert stellate.mesh(cut, 0.2, server=server).report.certified

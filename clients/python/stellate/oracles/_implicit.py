@@ -19,6 +19,14 @@ _LOOKS = 64  # points that F is looked at from where none leads to M
 _FEW = 0.25  # of the first batch, fewer of which find M where something is wrong with F
 _ZERO = 1e-6  # of what F is usually, where solvers that find no zero come to one
 _FLAT = 1e-2  # of how steep F is usually, where it is flat
+# Of where M's tangents were last asked for, that M is looked at for an end; and of the box, how far around.
+_LATELY, _BESIDE = 256, 1e-5
+
+_WHERE_F_ENDS = (
+    "Write the equation so that f is smooth around M, without roots, logarithms or quotients that end on "
+    "it: z^2 = 1 - x^2 in place of z = sqrt(1 - x^2). If M has a boundary there, cut it by a wall a little "
+    "before: inequalities=[g]"
+)
 
 
 class ImplicitManifold:
@@ -86,6 +94,7 @@ class ImplicitManifold:
         self.thread_safe = thread_safe
         self._max_iterations, self._looked = max_iterations, False
         self._clipped: Any = None  # this manifold within its inequalities
+        self._lately = np.empty((0, ambient_dimension))  # where tangents were last asked for
         self._scale = float(np.linalg.norm(upper - lower))
         library = jacobian if isinstance(jacobian, str) else None
         if isinstance(jacobian, str):
@@ -147,8 +156,40 @@ class ImplicitManifold:
         return self._equations.jacobian(np.asarray(points, dtype=float))
 
     def tangent_basis(self, points: np.ndarray) -> np.ndarray:
-        """Orthonormal bases (n, d, k) of the null space of the Jacobian at points of M."""
-        return null_space(self._equations.jacobian(np.asarray(points, dtype=float)))
+        """Orthonormal bases (n, d, k) of the null space of the Jacobian at points of M.
+
+        Raises: OracleError at a point where it has none, as the Jacobian is not finite.
+        """
+        points = np.asarray(points, dtype=float)
+        jacobian = self._equations.jacobian(points)
+        finite = np.isfinite(jacobian).all(axis=(1, 2))
+        if not finite.all():
+            raise OracleError(
+                f"the manifold ends where f does, near {points[~finite][0].tolist()}: the derivatives of "
+                f"f are not finite there. {_WHERE_F_ENDS}",
+                "ORACLE_NOT_FINITE",
+            )
+        self._lately = np.concatenate([self._lately, points])[-_LATELY:]
+        return null_space(jacobian)
+
+    def where_it_ends(self) -> str:
+        """A point of M beside which f is not finite, and what to do; "" if none is known.
+
+        Looks around the points where tangent spaces were last asked for: a mesh that does not end gathers
+        them there. Takes 512 d values of f at most.
+        """
+        d = self.ambient_dimension
+        steps = _BESIDE * self._scale * np.concatenate([np.eye(d), -np.eye(d)])
+        around = self._lately[:, None, :] + steps
+        values = self._equations.values(around.reshape(-1, d)).reshape(*around.shape[:2], -1)
+        lost = np.argwhere(~np.isfinite(values).all(axis=2))
+        if not len(lost):
+            return ""
+        row, step = lost[0]
+        return (
+            f"the manifold ends where f does, near {self._lately[row].tolist()}: at "
+            f"{around[row, step].tolist()}, beside it, f is {values[row, step].tolist()}. {_WHERE_F_ENDS}"
+        )
 
     def in_units(self, scale: np.ndarray) -> Any:
         """The oracle of {x / scale : x in M}; see oracles.in_units."""
