@@ -204,7 +204,14 @@ Task<> WallLaws::Closest(int wall, MatrixXd y) {
   const MatrixXd x = y + away * probe_.RandomUnits(y.cols());
   const Answered answered = co_await probe_.FacePoints(x, SetOfWall(wall));
   for (Index j = 0; j < x.cols(); ++j) {
-    const double own = answered.found[j] ? (answered.points.col(j) - x.col(j)).norm() : kInfinity;
+    if (!answered.found[j]) {
+      Add("FACE_MISSED", {{"wall", wall},
+                          {"query", Vector(x.col(j))},
+                          {"other", Vector(y.col(j))},
+                          {"seen", away}});
+      co_return;
+    }
+    const double own = (answered.points.col(j) - x.col(j)).norm();
     if (own <= away + slack_) continue;
     Add("FACE_NOT_CLOSEST", {{"wall", wall},
                              {"query", Vector(x.col(j))},

@@ -116,6 +116,10 @@ constexpr Words kWords[] = {
      "the point of wall {wall} nearest to {query} is said to be {answer}, at distance {own}, "
      "but {other} is nearer: {seen}",
      "Return the nearest point of M where the wall is zero, at least from near by."},
+    {"FACE_MISSED", Severity::kError,
+     "no point of wall {wall} is found from {query}, though {other} is one, {seen} away",
+     "A mesh asks from so near: is everything finite there, that is solved for, and does M go on "
+     "beyond the wall for as far as epsilon?"},
     {"FACE_NOT_FOUND", Severity::kError,
      "wall {wall} changes its sign on M near {query}, but no point of M where it is zero is "
      "found",

@@ -150,11 +150,22 @@ def across_the_equator(x, face):
     return y * [-1, -1, 1]
 
 
+def on_the_face_alone(x, face):
+    """Nothing from a little above the sphere."""
+    y = CUT.face_point(x, face)
+    near = np.linalg.norm(x, axis=1) > 1.001
+    raise_for = near & (np.linalg.norm(x - y, axis=1) < 0.1)
+    if raise_for.any():
+        raise stellate.NotConverged(y, ~raise_for)
+    return y
+
+
 OF_WALLS = {
     "NOTHING_LEFT": Cut(lambda x: x[:, 2] - 5),
     "FACE_OFF_MANIFOLD": Cut(face_point=lambda x, face: CUT.face_point(x, face) + 0.01),
     "FACE_CLEARANCE": Cut(clearances=lambda p: p[:, 2:] + 0.15),
     "FACE_NOT_CLOSEST": Cut(face_point=across_the_equator),
+    "FACE_MISSED": Cut(face_point=on_the_face_alone),
     "FACE_NOT_FOUND": Cut(lambda x: (x[:, 2] + 0.1) ** 3),
     "CONORMAL_NOT_UNIT": Cut(conormals=conormals(lambda n, along, p: 2 * n)),
     "CONORMAL_NOT_TANGENT": Cut(conormals=conormals(lambda n, along, p: 0.96 * n + 0.28 * p)),

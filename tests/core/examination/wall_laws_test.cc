@@ -3,11 +3,13 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <ostream>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/examiner.h"
@@ -33,7 +35,7 @@ class Cut final : public Clipped {
   Cut() : Clipped(Known("sphere:2"), {HalfSpace(Up(), -0.1)}) {}
   Answer FacePoint(const MatrixXd& x, const Walls& face) override {
     Answer answer = Clipped::FacePoint(x, face);
-    if (on_face) on_face(answer.points);
+    if (on_face) on_face(x, answer);
     return answer;
   }
   MatrixXd Clearances(const MatrixXd& points) override {
@@ -45,7 +47,7 @@ class Cut final : public Clipped {
     return conormals;
   }
 
-  std::function<void(MatrixXd& points)> on_face;
+  std::function<void(const MatrixXd& x, Answer& answer)> on_face;
   std::function<void(const MatrixXd& points, MatrixXd& conormals)> on_conormals;
   double off = 0;
 };
@@ -83,14 +85,32 @@ INSTANTIATE_TEST_SUITE_P(
         BrokenWall{"FACE_OFF_MANIFOLD",
                    [] {
                      return With([](Cut& o) {
-                       o.on_face = [](MatrixXd& points) { points.array() += 0.01; };
+                       o.on_face = [](const MatrixXd&, Answer& answer) {
+                         answer.points.array() += 0.01;
+                       };
                      });
                    }},
         BrokenWall{"FACE_CLEARANCE", [] { return With([](Cut& o) { o.off = 0.05; }); }},
         BrokenWall{"FACE_NOT_CLOSEST",
                    [] {
                      return With([](Cut& o) {
-                       o.on_face = [](MatrixXd& points) { points.topRows(2) *= -1; };
+                       o.on_face = [](const MatrixXd&, Answer& answer) {
+                         answer.points.topRows(2) *= -1;
+                       };
+                     });
+                   }},
+        BrokenWall{"FACE_MISSED",
+                   [] {
+                     return With([](Cut& o) {
+                       o.on_face = [](const MatrixXd& x, Answer& answer) {
+                         std::vector<std::uint8_t> found;
+                         for (Eigen::Index j = 0; j < x.cols(); ++j) {
+                           const bool is_near = (x - answer.points).col(j).norm() < 0.1;
+                           const bool is_off = std::abs(x.col(j).norm() - 1) > 1e-6;
+                           found.push_back(answer.IsFound(j) && !(is_near && is_off));
+                         }
+                         answer.found = std::move(found);
+                       };
                      });
                    }},
         BrokenWall{"CONORMAL_NOT_UNIT",
