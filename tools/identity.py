@@ -81,6 +81,12 @@ STATED = {
     ),
     "cmake/packages.cmake": ((r"CPACK_DEBIAN_PACKAGE_HOMEPAGE (.*)\)", "{home}"),),
     "docker/Dockerfile": _IMAGE,
+    "docker/helm/stellate/Chart.yaml": (
+        (r"\nhome: (.*)", "{home}"),
+        (r"\nsources:\n  - (.*)", "{source}"),
+        (r"\n  - name: (.*)", "{maintainer}"),
+        (r"\n    email: (.*)", "{email}"),
+    ),
 }
 
 

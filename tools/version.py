@@ -32,6 +32,7 @@ STATED = {
     "docker/Dockerfile": r"\bstellate:(\d\S*)",
     "docker/alone.yaml": r"image: stellate:(\S+)",
     "docker/compose.yaml": r"image: stellate[\w-]*:(\S+)",
+    "docker/helm/stellate/Chart.yaml": r'\n(?:version: |appVersion: ")([\d.]+)',
     "docker/kubernetes/kustomization.yaml": r"name: stellate[\w-]*\n    newTag: (\S+)",
     "docs/using/building.md": r"find_package\(stellate (\S+)",
     "examples/CMakeLists.txt": r"find_package\(stellate (\S+)",

@@ -44,6 +44,21 @@ def arguments_of(item: Object) -> dict[str, str]:
     return {flag: value for flag, _, value in pairs}
 
 
+def balancer(objects: Objects) -> str:
+    """HAProxy's configuration: of a ConfigMap, or what kustomize makes one of."""
+    if ("ConfigMap", "proxy") in objects:
+        return str(objects["ConfigMap", "proxy"]["data"]["haproxy.cfg"])
+    return (MANIFESTS / "haproxy.cfg").read_text()
+
+
+def secrets_of(volume: Object) -> list[tuple[str, Object]]:
+    """Its files of secrets: each the secret's name, and which key lies at which path."""
+    if "secret" in volume:
+        return [(volume["secret"]["secretName"], entry) for entry in volume["secret"]["items"]]
+    sources = [source["secret"] for source in volume.get("projected", {}).get("sources", [])]
+    return [(source["name"], entry) for source in sources for entry in source["items"]]
+
+
 def workloads(objects: Objects) -> dict[str, Object]:
     """What has pods, by name."""
     return {name: o for (kind, name), o in objects.items() if kind in ("StatefulSet", "Deployment")}

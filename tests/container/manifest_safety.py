@@ -11,15 +11,16 @@ import tempfile
 from collections.abc import Iterator
 
 from kubernetes_objects import (
-    MANIFESTS,
     ROOT,
     Object,
     Objects,
     arguments_of,
+    balancer,
     container_of,
     find,
     kustomization,
     pod_of,
+    secrets_of,
     workloads,
 )  # fmt: skip
 
@@ -27,7 +28,7 @@ from kubernetes_objects import (
 def ways_in(objects: Objects) -> Iterator[str]:
     """Nothing is said in plain text, but metrics; the proxy leads to every server."""
     for name, item in workloads(objects).items():
-        yield from _secrets(name, item)
+        yield from _secrets(name, item, objects)
     server = objects["StatefulSet", "stellated"]
     for flag in ("--tls-cert", "--tls-key", "--token-file"):
         if flag not in arguments_of(server):
@@ -44,12 +45,14 @@ def ways_in(objects: Objects) -> Iterator[str]:
         for i in range(server["spec"]["replicas"])
     }
     given = {
-        e["name"]: e["value"] for e in container_of(objects["Deployment", "proxy"]).get("env", [])
+        e["name"]: e["value"]
+        for e in container_of(objects["Deployment", "proxy"]).get("env", [])
+        if re.fullmatch(r"STELLATED_\d+", e["name"])
     }
     if given != wanted:
         yield f"the proxy leads to {given}, and servers are {wanted}"
-    used = set(re.findall(r"STELLATED_\d+", (MANIFESTS / "haproxy.cfg").read_text()))
-    if used != set(wanted):
+    used = set(re.findall(r"STELLATED_\d+", balancer(objects)))
+    if not set(wanted) <= used:
         yield f"haproxy.cfg knows {sorted(used)}"
     if not objects["Service", "stellated"]["spec"].get("publishNotReadyAddresses"):
         yield "the proxy loses the names of servers that are not ready"
@@ -78,26 +81,29 @@ def policies(objects: Objects) -> Iterator[str]:
     allowed = [list(find(way.get("from", []), "app.kubernetes.io/name")) or
                list(find(way.get("from", []), "kubernetes.io/metadata.name"))
                for way in found.get("stellated", {}).get("ingress", [])]  # fmt: skip
-    if allowed != [["proxy"], ["monitoring"]]:
+    others = (
+        ["stellated"] if "--database" in arguments_of(objects["StatefulSet", "stellated"]) else []
+    )
+    if allowed != [["proxy", *others], ["monitoring"]]:
         yield f"servers may be called by {allowed}"
 
 
-def _secrets(name: str, item: Object) -> Iterator[str]:
+def _secrets(name: str, item: Object, objects: Objects) -> Iterator[str]:
     """What its program reads is mounted, and docker/make-secrets makes it."""
     volumes = {volume["name"]: volume for volume in pod_of(item).get("volumes", [])}
     there = set()
     for mount in container_of(item).get("volumeMounts", []):
-        secret = volumes.get(mount["name"], {}).get("secret", {})
-        for entry in secret.get("items", []):
+        for secret, entry in secrets_of(volumes.get(mount["name"], {})):
             there.add(f"{mount['mountPath']}/{entry['path']}")
-            if entry["key"] not in made_secrets():
+            if secret == "stellate" and entry["key"] not in {*made_secrets(), "database"}:
                 yield f"{name}: docker/make-secrets makes no {entry['key']}"
         config = volumes.get(mount["name"], {}).get("configMap", {}).get("name")
-        if config and config not in {c["name"] for c in kustomization()["configMapGenerator"]}:
+        made = {c["name"] for c in kustomization()["configMapGenerator"]}
+        if config and config not in made and ("ConfigMap", config) not in objects:
             yield f"{name}: there is no ConfigMap {config}"
     text = json.dumps(container_of(item))
     if name == "proxy":
-        text = (MANIFESTS / "haproxy.cfg").read_text()
+        text = balancer(objects)
     for path in set(re.findall(r"/etc/stellate/[\w.]+", text)) - there:
         yield f"{name} reads {path}, which is not mounted"
 

@@ -13,7 +13,7 @@ import pathlib
 import re
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from typing import Any
 
 import manifest_safety
@@ -37,6 +37,7 @@ _MODELS = {("autoscaling/v2", "HorizontalPodAutoscaler"): "V2beta2HorizontalPodA
 # What is served by every Kubernetes from 1.25 on.
 _VERSIONS = {
     "Namespace": "v1",
+    "ConfigMap": "v1",
     "Service": "v1",
     "NetworkPolicy": "networking.k8s.io/v1",
     "StatefulSet": "apps/v1",
@@ -47,11 +48,13 @@ _VERSIONS = {
 _QUANTITY = re.compile(r"[0-9]+(\.[0-9]+)?(m|k|M|G|T|Ki|Mi|Gi|Ti)?")
 
 
-def problems(objects: Objects) -> list[str]:
-    """All that is wrong. Later rules take for granted what earlier ones see to."""
+def problems(objects: Objects, without: Container[str] = ()) -> list[str]:
+    """All that is wrong, rules of some names left out. Later rules take for granted what earlier ones see to."""
     rules = (_schema, _placement, _programs, _selectors, _ports, _volumes, _numbers, _confinement,
              manifest_safety.ways_in, manifest_safety.policies)  # fmt: skip
     for rule in rules:
+        if rule.__name__ in without:
+            continue
         if found := list(rule(objects)):
             return found
     return []
@@ -142,7 +145,7 @@ def _selectors(objects: Objects) -> Iterator[str]:
 
     guarded = []
     for (kind, name), item in objects.items():
-        spec = item["spec"] if kind != "Namespace" else {}
+        spec = item.get("spec", {})
         wanted = spec.get("selector", {})
         if kind in ("StatefulSet", "Deployment") and selected(wanted["matchLabels"]) != [name]:
             yield f"{kind}/{name} has to select its own pods and no others"
@@ -158,7 +161,7 @@ def _selectors(objects: Objects) -> Iterator[str]:
                 yield f"{kind}/{name} scales nothing: {target}"
             elif "replicas" in scaled["spec"]:
                 yield f"{target['name']} sets replicas, which are the autoscaler's"
-    if sorted(guarded) != sorted(labels):
+    if sorted(guarded) != sorted(n for n in labels if least_of(objects, n) > 1):
         yield f"PodDisruptionBudgets guard {guarded}"
     for name, item in workloads(objects).items():
         for term in find(pod_of(item), "podAffinityTerm"):
@@ -233,9 +236,11 @@ def _numbers(objects: Objects) -> Iterator[str]:
         yield f"pods are killed after {grace} s, but drain for {drain} s"
     for name, item in workloads(objects).items():
         scaler = objects.get(("HorizontalPodAutoscaler", name), {"spec": {}})["spec"]
-        least = scaler.get("minReplicas", item["spec"].get("replicas", 1))
+        least = least_of(objects, name)
         if least > scaler.get("maxReplicas", least):
             yield f"{name}: at least {least} replicas, and at most {scaler['maxReplicas']}"
+        if least == 1:  # it goes when its node goes
+            continue
         budget = objects["PodDisruptionBudget", name]["spec"]
         stay = budget.get("minAvailable")
         leave = budget["maxUnavailable"] if stay is None else least - stay
@@ -243,6 +248,12 @@ def _numbers(objects: Objects) -> Iterator[str]:
             yield f"PodDisruptionBudget/{name}: {leave} of {least} may leave at once"
         if scaler and "cpu" not in container_of(item)["resources"].get("requests", {}):
             yield f"{name} is scaled by a share of no request"
+
+
+def least_of(objects: Objects, name: str) -> int:
+    """How many pods a workload has at least."""
+    scaler = objects.get(("HorizontalPodAutoscaler", name), {"spec": {}})["spec"]
+    return int(scaler.get("minReplicas", workloads(objects)[name]["spec"].get("replicas", 1)))
 
 
 def _confinement(objects: Objects) -> Iterator[str]:

@@ -139,16 +139,16 @@ class Cluster:
             wait_for(server.is_ready)
         return started
 
-    def front(self, *servers: Server) -> str:
-        """HAProxy, as docker/postgres configures it, that spreads connections over servers."""
+    def front(self, *servers: Server, text: str = "", **environment: str) -> str:
+        """HAProxy before servers, as docker/postgres or that text configures it."""
         port, config = free_port(), self._folder / f"haproxy-{len(self._proxies)}.cfg"
-        text = (ROOT / "docker/postgres/haproxy.cfg").read_text()
+        text = text or (ROOT / "docker/postgres/haproxy.cfg").read_text()
         assert text.count("bind :7717") == 1
         text = text.replace("bind :7717", f"bind 127.0.0.1:{port}")
         for i in range(2, len(servers)):
             text += f'    server stellated-{i} "${{STELLATED_{i}}}"\n'
         config.write_text(text)
-        environment = {f"STELLATED_{i}": server.address for i, server in enumerate(servers)}
+        environment |= {f"STELLATED_{i}": server.address for i, server in enumerate(servers)}
         command = [HAPROXY, "-db", "-f", str(config)]
         self._proxies.append(
             subprocess.Popen(
