@@ -131,6 +131,8 @@ def plain(html: pathlib.Path) -> list[str]:
         ("docs/gallery/index.html", "Dimension 2 in <em>R</em><sup>3</sup>"),
         ("docs/howto/equations.html", "<em>R</em><sup>d\u2212k</sup>"),
         ("README.html", "O(<em>\u03b5</em><sup>\u2212k</sup>)"),
+        ("index.html", 'url=README.html"'),  # where one arrives: the strip, and a mesh that grows
+        ("README.html", "growing.gif"),
     ):
         if wanted not in (html / page).read_text():
             found.append(f"{page} does not have {wanted}")

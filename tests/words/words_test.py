@@ -48,6 +48,16 @@ class Words(unittest.TestCase):
         self.assertEqual(found, [], "\n" + "\n".join(found))
 
 
+class FrontPage(unittest.TestCase):
+    def test_it_is_read_in_five_minutes(self) -> None:
+        text = re.sub(r"(?ms)^```.*?^```$", "", (ROOT / "README.md").read_text())
+        text = re.sub(r"(?m)^    .*$", "", text)  # what the shell is told
+        text = re.sub(r"\]\([^)]*\)", "]", text)
+        words = re.findall(r"[A-Za-z0-9][^\s|]*", text)
+        self.assertLess(len(words), 700)
+        self.assertGreater(len(words), 400)
+
+
 class Glossary(unittest.TestCase):
     def test_it_has_what_classes_of_the_core_and_of_dispatching_are_named_after(self) -> None:
         """A word of a class's name is in the glossary, or is no term of ours: ordinary.txt."""
