@@ -1,7 +1,12 @@
 #pragma once
 
+#include <string>
+
 namespace stellate::server {
 
-const char* Version();  // of this program, as `--version` says it
+const char* Version();  // of this program
+
+// The line of `--version`, which names the gRPC it runs on as well: advisories are about that.
+std::string VersionLine();
 
 }  // namespace stellate::server

@@ -80,7 +80,7 @@ struct CommandLine {
 CommandLine::CommandLine(Flags* into) {
   Flags& flags = *into;
   app.option_defaults()->always_capture_default();
-  app.set_version_flag("--version", std::string("stellated ") + Version());
+  app.set_version_flag("--version", VersionLine());
   app.set_config("--config", "",
                  "File of lines \"KEY = VALUE\", the keys being these flags without dashes. Read "
                  "again after SIGHUP: --print-config says which settings change then");

@@ -22,9 +22,10 @@ class Version(unittest.TestCase):
 
     def test_programs_say_it(self) -> None:
         folder = pathlib.Path(os.environ["STELLATED"]).parent
-        for name in ("stellated", "stellate"):
+        for name, more in (("stellated", r" \(gRPC \d+\.\d+\.\d+\)"), ("stellate", "")):
             done = subprocess.run([folder / name, "--version"], capture_output=True, text=True)
-            self.assertEqual(done.stdout, f"{name} {VERSION}")
+            said = rf"\A{name} {re.escape(VERSION.strip())}{more}\n\Z"
+            self.assertRegex(done.stdout, said)
 
     def test_python_says_it(self) -> None:
         program = "import stellate; print(stellate.__version__)"

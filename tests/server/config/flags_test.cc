@@ -2,6 +2,7 @@
 
 #include "server/config/flags.h"
 
+#include <grpcpp/grpcpp.h>
 #include <gtest/gtest.h>
 #include <unistd.h>
 
@@ -11,6 +12,7 @@
 #include <set>
 #include <type_traits>
 
+#include "server/base/version.h"
 #include "server/config/settings.h"
 
 namespace stellate::server {
@@ -149,6 +151,11 @@ TEST_F(FlagsTest, HelpHasEveryFlagOnce) {
     EXPECT_TRUE(flags.insert(setting.flag).second) << setting.flag;
     EXPECT_NE(out_.find(std::string("  ") + setting.flag), std::string::npos) << setting.flag;
   }
+}
+
+TEST_F(FlagsTest, VersionNamesTheGrpcItRunsOn) {
+  EXPECT_EQ(Parse({"--version"}).exit_status, 0);
+  EXPECT_EQ(out_, std::string("stellated ") + Version() + " (gRPC " + grpc::Version() + ")\n");
 }
 
 TEST_F(FlagsTest, TheFileCanBeReadAgain) {
