@@ -18,6 +18,7 @@ import sys
 import tempfile
 import time
 import unittest
+import urllib.parse
 from typing import Any
 
 import kubernetes_objects
@@ -391,6 +392,91 @@ class Compose(unittest.TestCase):
         host, port = targets[0].split(":")
         command = dict(a.split("=") for a in self.services[host]["command"] if "=" in a)
         self.assertEqual(command["--metrics-listen"].rsplit(":", 1)[1], port)
+
+
+class Failover(unittest.TestCase):
+    """The compose file of two servers on one PostgreSQL. tests/postgres runs what it says."""
+
+    def setUp(self) -> None:
+        self.all = composed(ROOT / "docker" / "failover.yaml")
+        self.services = self.all["services"]
+        self.servers = {n: s for n, s in self.services.items() if n.startswith("stellated-")}
+
+    def test_services_are_confined_and_of_versions(self) -> None:
+        self.assertEqual(set(self.services), {"proxy", "database", *self.servers})
+        for name, service in self.services.items():
+            self.assertTrue(service["read_only"], name)
+            self.assertEqual(service["cap_drop"], ["ALL"], name)
+            self.assertNotEqual(service.get("user", "65532").split(":")[0], "root", name)
+            if name in self.servers:
+                self.assertEqual(service["image"], f"stellate:{manifests.version()}")
+                self.assertEqual(service["build"]["target"], "runtime")
+            else:
+                self.assertIn(service["image"], pinned_images().values(), name)
+        (port,) = self.services["proxy"]["ports"]
+        self.assertTrue(port.startswith("127.0.0.1:"), port)
+        for name in ("database", *self.servers):
+            self.assertNotIn("ports", self.services[name], "the proxy is the way in")
+
+    def test_the_image_has_what_servers_need(self) -> None:
+        """It is built with libpq: the argument is the Dockerfile's, and means something there."""
+        text = (ROOT / "docker/Dockerfile").read_text()
+        for server in self.servers.values():
+            given = server["build"]["args"]
+            self.assertEqual(given["STELLATE_POSTGRES"], "ON")
+            self.assertLessEqual(set(given), set(re.findall(r"^ARG (\w+)", text, re.M)))
+
+    def test_servers_have_the_same_settings_and_each_a_name(self) -> None:
+        first, *others = self.servers.values()
+        self.assertTrue(others)
+        known = manifests.flags_of([os.environ["STELLATED"]])
+        self.assertLessEqual(manifests.flags_in(first["command"]), known)
+        for name, server in self.servers.items():
+            self.assertEqual(server["hostname"], name, "where others dial it")
+            for field in ("command", "image", "volumes"):
+                self.assertEqual(server[field], first[field], name)
+        flags = manifests.flags_in(first["command"])
+        self.assertLessEqual({"--tls-cert", "--tls-key", "--token-file"}, flags)
+        self.assertFalse({"--data-dir", "--insecure-listen"} & flags)
+
+    def test_servers_reach_the_database_and_nothing_else_does(self) -> None:
+        database = self.services["database"]
+        self.assertEqual(database["network_mode"], "none")
+        self.assertEqual(database["command"][-1], "listen_addresses=")
+        url = urllib.parse.urlsplit(given_to(self.servers["stellated-0"])["--database"])
+        self.assertEqual(url.username, database["environment"]["POSTGRES_USER"])
+        self.assertEqual(url.path, f"/{url.username}", "the image names its database so")
+        self.assertFalse(url.hostname or url.password)
+        (place,) = urllib.parse.parse_qs(url.query)["host"]
+        sharing = {n for n, s in self.services.items() if f"socket:{place}:rw" in s["volumes"]}
+        self.assertEqual(sharing, {"database", *self.servers})
+        self.assertIn("records:/var/lib/postgresql/data:rw", database["volumes"])
+        self.assertEqual(set(self.all["volumes"]), {"records", "socket"})
+
+    def test_the_proxy_leads_to_all_servers(self) -> None:
+        proxy = self.services["proxy"]
+        led = {value for name, value in proxy["environment"].items() if name[-1].isdigit()}
+        ports = {given_to(s)["--listen"].rsplit(":", 1)[1] for s in self.servers.values()}
+        (port,) = ports
+        self.assertEqual(led, {f"{name}:{port}" for name in self.servers})
+        config = (ROOT / "docker/postgres/haproxy.cfg").read_text()
+        self.assertIn(f"bind :{proxy['ports'][0].split('/')[0].rsplit(':', 1)[1]}\n", config)
+        asked = set(re.findall(r"\bSTELLATED_\w+", config))
+        self.assertEqual(set(proxy["environment"]), asked)
+        self.assertIn("STELLATED_TLS", asked, "whether it lives is asked over TLS, too")
+
+    def test_secrets_are_made(self) -> None:
+        made = manifest_safety.made_secrets()
+        for name, server in self.servers.items():
+            secret = {v.split(":")[1] for v in server["volumes"] if "/secrets/" in v}
+            files = {v for v in given_to(server).values() if v.startswith("/etc/stellate/")}
+            self.assertEqual(secret, files, name)
+            self.assertLessEqual({pathlib.PurePosixPath(file).name for file in files}, made)
+
+
+def given_to(service: dict[str, Any]) -> dict[str, str]:
+    """The flags of a service's command, with their values."""
+    return dict(flag.split("=", 1) for flag in service["command"])
 
 
 class Pins(unittest.TestCase):

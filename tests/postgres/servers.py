@@ -188,16 +188,18 @@ class Gated(manifolds.Torus):
 class Made(threading.Thread):
     """A mesh on its way in a thread: its one worker, and its watcher."""
 
-    def __init__(self, address: str) -> None:
+    def __init__(self, address: str, credentials: stellate.Credentials | None = None) -> None:
         super().__init__(daemon=True)
-        self._address, self.oracle = address, Gated()
+        self._address, self._credentials, self.oracle = address, credentials, Gated()
         self.mesh: stellate.Mesh | None = None
         self.error: Exception | None = None
         self.start()
 
     def run(self) -> None:
         try:
-            with stellate.Client(self._address, reconnect_seconds=PATIENCE) as client:
+            with stellate.Client(
+                self._address, self._credentials, reconnect_seconds=PATIENCE
+            ) as client:
                 self.mesh = stellate.mesh(self.oracle, EPSILON, server=client)
         except Exception as error:  # shown by who waits for it
             self.error = error
