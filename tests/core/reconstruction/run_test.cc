@@ -17,10 +17,16 @@ using testing::Sample;
 using testing::SampleRequest;
 
 TEST(Run, IsTheSameForAnyNumberOfThreads) {
-  for (const SampleRequest& request :
-       {Of("torus", 1500, false, .2), Of("so3", 800, false), Of("torus", 300, false)}) {
-    const Sample sample = Draw(request);
+  struct Case {
+    SampleRequest sample;
+    Weighting weights = Weighting::kAuto;
+  };
+  for (const Case& c : {Case{Of("torus", 1500, false, .2)}, Case{Of("so3", 800, false)},
+                        Case{Of("torus", 300, false)}, Case{Of("so3", 200, true), Weighting::kOnly},
+                        Case{Of("torus", 800, false), Weighting::kOnly}}) {
+    const Sample sample = Draw(c.sample);
     ReconstructionSpecification spec = SpecOf(sample.k, sample.d);
+    spec.weights = c.weights;
     spec.threads = 1;
     const auto one = Reconstruct(spec, {sample.points, {}});
     spec.threads = 8;
