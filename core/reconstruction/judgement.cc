@@ -186,9 +186,17 @@ class Judge {
                    "such places (weights = auto)");
   }
 
+  // What is said of the dimension, if it looks wrong, and then of the places.
+  std::string DimensionAndCauses() const {
+    std::string all = OtherDimension();
+    if (known_.against > 0)
+      all += Message(all.empty() ? "" : ". As it is, ", "something is wrong ", Causes());
+    return all;
+  }
+
   // Why a manifold is not certified.
   std::string WhatIsMissing() const {
-    if (std::string other = OtherDimension(); !other.empty()) return other;
+    if (!OtherDimension().empty()) return DimensionAndCauses();
     if (known_.against > 0) return Causes();
     if (!LooksRight())
       return Message("most places do not look ", spec_.dimension, "-dimensional, see the warnings");
@@ -221,10 +229,7 @@ class Judge {
       case CertificateLevel::kRefused:
         break;
     }
-    const std::string other = OtherDimension();
-    std::string causes;
-    if (known_.against > 0) causes = Message("something is wrong ", Causes());
-    if (!other.empty()) causes = other + (causes.empty() ? "" : ". As it is, ") + causes;
+    const std::string causes = DimensionAndCauses();
     return Message("Not certified: ",
                    causes.empty() ? std::string()
                                   : Message("the points do not make a manifold of dimension ",

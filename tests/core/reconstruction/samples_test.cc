@@ -80,6 +80,21 @@ TEST(Refusal, OfFewOrNoisyPointsDoesNotInsistOnAnotherDimension) {
   EXPECT_NE(noisy.find("or less noise"), std::string::npos) << noisy;
 }
 
+// A closed curve of the right topology, so noisy that most places look 2-dimensional: the verdict
+// says that, and which places say NOISE.
+TEST(Refusal, OfARightCurveSaysTheDimensionAndThePlaces) {
+  const Sample sample = Draw(Of("circle", 200, false, 1));
+  const auto result = Reconstruct(SpecOf(1, 2), {sample.points, {}});
+  ASSERT_TRUE(result) << result.error().message;
+  const Certificate& certificate = result->report.certificate;
+  EXPECT_EQ(certificate.level, CertificateLevel::kDecided);
+  EXPECT_NE(certificate.verdict.find("they look 2-dimensional"), std::string::npos)
+      << certificate.verdict;
+  EXPECT_NE(certificate.verdict.find("As it is, something is wrong at "), std::string::npos)
+      << certificate.verdict;
+  EXPECT_NE(certificate.verdict.find("NOISE"), std::string::npos) << certificate.verdict;
+}
+
 TEST_P(Refuses, AndNamesTheCause) {
   const Sample sample = Draw(GetParam().sample);
   const auto result = Reconstruct(SpecOf(GetParam().k, sample.d), {sample.points, {}});
