@@ -244,7 +244,7 @@ EVERY_SERVER = tuple(SERVER)
 TESTS = {
     "tests/support": (*FACE, "clients/cpp/include"),
     "tests/core": (*EVERY_CORE, "tests/support", "tests/reconstruction", "clients/cpp/include"),
-    "tests/reconstruction": (*FACE, "core/index"),
+    "tests/reconstruction": (*FACE, "core/index", "tests/support"),
     "tests/server": (*FACE, "proto", *EVERY_SERVER, "tests/support"),
     "tests/clients": ("proto", *EVERY_CPP, *EVERY_PYTHON, "clients/cli", "tests/support"),
     "tests/e2e": ("proto", *EVERY_CPP, *EVERY_PYTHON, "tests/support"),

@@ -6,6 +6,8 @@
 #include <numeric>
 #include <set>
 
+#include "tests/support/homology.h"
+
 namespace stellate::testing {
 namespace {
 
@@ -164,6 +166,15 @@ Counted Count(int k, const std::vector<std::uint32_t>& ids, std::uint32_t vertic
 bool IsRight(const Counted& counted, const Sample& sample) {
   return counted.IsClosedManifold() && counted.components == sample.components &&
          counted.euler == sample.euler && counted.orientable == sample.orientable;
+}
+
+bool HasHomologyOf(const Sample& sample, const std::vector<std::uint32_t>& simplices) {
+  const auto width = static_cast<std::size_t>(sample.k) + 1;
+  std::vector<Facet> facets;
+  for (std::size_t at = 0; at + width <= simplices.size(); at += width)
+    facets.emplace_back(simplices.begin() + static_cast<std::ptrdiff_t>(at),
+                        simplices.begin() + static_cast<std::ptrdiff_t>(at + width));
+  return BettiNumbers(facets, 2) == sample.betti;
 }
 
 }  // namespace stellate::testing

@@ -28,4 +28,7 @@ Counted Count(int k, const std::vector<std::uint32_t>& simplices, std::uint32_t 
 // Whether it is a closed manifold with the topology of the sample's.
 bool IsRight(const Counted& counted, const Sample& sample);
 
+// Whether GUDHI finds the homology mod 2 of the sample's manifold in simplices of its dimension.
+bool HasHomologyOf(const Sample& sample, const std::vector<std::uint32_t>& simplices);
+
 }  // namespace stellate::testing

@@ -25,7 +25,7 @@ using Eigen::VectorXd;
 struct Known {
   int k, d;
   double reach;
-  std::int64_t euler;
+  std::vector<int> betti;  // mod 2
   bool orientable;
   double volume;
   std::function<VectorXd(const VectorXd&)> chart;  // none: a sphere or SO(3)
@@ -83,21 +83,21 @@ double VolumeBySum(const Known& m) {
 }
 
 Known Find(const std::string& name) {
-  if (name == "circle") return {1, 2, 1, 0, true, 2 * kPi, FlatTorus, 1};
+  if (name == "circle") return {1, 2, 1, {1, 1}, true, 2 * kPi, FlatTorus, 1};
   if (name == "knot") {
-    Known knot{1, 3, .45, 0, true, 0, Knot, 3.1};
+    Known knot{1, 3, .45, {1, 1}, true, 0, Knot, 3.1};
     knot.volume = VolumeBySum(knot);
     return knot;
   }
-  if (name == "s2" || name == "shells") return {2, 3, 1, 2, true, 4 * kPi, nullptr, 1};
-  if (name == "torus") return {2, 3, .4, 0, true, 1.6 * kPi * kPi, Torus, .56};
-  if (name == "half") return {2, 3, .4, 0, true, .8 * kPi * kPi, Torus, .56};
-  if (name == "t2") return {2, 4, 1, 0, true, 4 * kPi * kPi, FlatTorus, 1};
-  if (name == "klein") return {2, 4, .4, 0, false, 1.62 * kPi * kPi, Klein, .58};
-  if (name == "s3") return {3, 4, 1, 0, true, 2 * kPi * kPi, nullptr, 1};
+  if (name == "s2" || name == "shells") return {2, 3, 1, {1, 0, 1}, true, 4 * kPi, nullptr, 1};
+  if (name == "torus") return {2, 3, .4, {1, 2, 1}, true, 1.6 * kPi * kPi, Torus, .56};
+  if (name == "half") return {2, 3, .4, {1, 2, 1}, true, .8 * kPi * kPi, Torus, .56};
+  if (name == "t2") return {2, 4, 1, {1, 2, 1}, true, 4 * kPi * kPi, FlatTorus, 1};
+  if (name == "klein") return {2, 4, .4, {1, 2, 1}, false, 1.62 * kPi * kPi, Klein, .58};
+  if (name == "s3") return {3, 4, 1, {1, 0, 0, 1}, true, 2 * kPi * kPi, nullptr, 1};
   if (name == "so3")
-    return {3, 9, std::sqrt(2.0), 0, true, 8 * kPi * kPi * std::sqrt(8.0), nullptr, 1};
-  if (name == "t3") return {3, 6, 1, 0, true, 8 * kPi * kPi * kPi, FlatTorus, 1};
+    return {3, 9, std::sqrt(2.0), {1, 1, 1, 1}, true, 8 * kPi * kPi * std::sqrt(8.0), nullptr, 1};
+  if (name == "t3") return {3, 6, 1, {1, 3, 3, 1}, true, 8 * kPi * kPi * kPi, FlatTorus, 1};
   throw std::invalid_argument("no manifold " + name);
 }
 
@@ -192,7 +192,7 @@ Sample Draw(const SampleRequest& request) {
   sample.d = known.d;
   sample.volume = known.volume;
   sample.reach = known.reach;
-  sample.euler = known.euler;
+  sample.betti = known.betti;
   sample.orientable = known.orientable;
   std::vector<VectorXd> points;
   std::vector<MatrixXd> tangents;
@@ -225,10 +225,12 @@ Sample Draw(const SampleRequest& request) {
       tangents.insert(tangents.end(), bases.begin(), bases.end());
     }
     sample.components = 2;
-    sample.euler = 4;
+    sample.betti = {2, 0, 2};
     sample.volume *= 1 + out * out;
     sample.reach = (out - 1) / 2;
   }
+  for (std::size_t i = 0; i < sample.betti.size(); ++i)
+    sample.euler += i % 2 == 0 ? sample.betti[i] : -sample.betti[i];
   const VectorXd centre = points.front();
   std::vector<Index> keep;
   for (std::size_t i = 0; i < points.size(); ++i)

@@ -12,6 +12,7 @@ struct Sample {
   int k = 0, d = 0;
   double volume = 0, reach = 0;
   std::int64_t euler = 0;
+  std::vector<int> betti;  // mod 2, 0 to k
   bool orientable = true;
   int components = 1;
   Eigen::MatrixXd points;    // d x n
