@@ -6,6 +6,7 @@ The tests do each a few times, the campaign by the thousand.
 from __future__ import annotations
 
 import collections
+import dataclasses
 import faulthandler
 import itertools
 import random
@@ -30,25 +31,33 @@ from servers import (
 from stellate import manifolds
 
 
+@dataclasses.dataclass(frozen=True)
+class Takeover:
+    """Seconds, by this machine's clock."""
+
+    gaps: list[float]  # each mesh was asked nothing, at the longest
+    missed: float  # from the end of the one server until the other replayed the first mesh
+    replayed: float  # from then until it had replayed the last
+
+
 def take_over(
     cluster: Cluster, expected: stellate.Mesh, meshes: int, how: signal.Signals
-) -> list[float]:
-    """Ends a server that has `meshes` under way: all end on the other, bit for bit.
-
-    Returns for how many seconds each was asked nothing, at the longest.
-    """
+) -> Takeover:
+    """Ends a server that has `meshes` under way: all end on the other, bit for bit."""
     (first,) = cluster.ready("first")
-    second = cluster.add("second")
+    second = cluster.add("second", "--log-format", "json")
     address = cluster.front(first, second)
     made = [Made(address) for _ in range(meshes)]
     for one in made:
         one.reach()
     second.start()
     wait_for(second.is_ready)
-    ended = time.monotonic()
+    ended, clock = time.monotonic(), time.time()
     first.end(how)
     finish(made, expected)
-    return [longest_gap([ended, *(t for t in one.oracle.asked if t > ended)]) for one in made]
+    gaps = [longest_gap([ended, *(t for t in one.oracle.asked if t > ended)]) for one in made]
+    begun, done = second.logged("replaying"), second.logged("replayed; going on with new answers")
+    return Takeover(gaps, min(begun) - clock, max(done) - min(begun))
 
 
 def longest_gap(times: list[float]) -> float:

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import contextlib
+import datetime
+import json
 import os
 import pathlib
+import re
 import shlex
 import shutil
 import signal
@@ -13,6 +17,7 @@ import threading
 import time
 import urllib.error
 import urllib.request
+from collections.abc import Iterator
 from typing import Callable
 
 import stellate
@@ -36,6 +41,21 @@ def wait_for(what: Callable[[], object]) -> None:
 def sql(database: str, statement: str) -> str:
     command = ["psql", database, "--no-psqlrc", "-qtAX", "-v", "ON_ERROR_STOP=1", "-c", statement]
     return subprocess.run(command, check=True, capture_output=True, text=True).stdout.strip()
+
+
+@contextlib.contextmanager
+def holding(database: str, rows: str) -> Iterator[None]:
+    """Holds these rows: statements that would change them wait until this ends."""
+    command = ["psql", database, "--no-psqlrc", "-qtAX", "-v", "ON_ERROR_STOP=1"]
+    with subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as session:
+        session.stdin.write(f"BEGIN;\n{rows} FOR UPDATE;\n\\echo held\n")
+        session.stdin.flush()
+        assert "held" in iter(lambda: session.stdout.readline().strip() or "gone", "gone")
+        yield
+        session.stdin.close()
+        session.wait(PATIENCE)
 
 
 def control(*words: str) -> None:
@@ -95,6 +115,15 @@ class Server:
 
     def log(self) -> str:
         return (self._folder / f"{self._name}.log").read_text()
+
+    def logged(self, message: str) -> list[float]:
+        """When it said that, in seconds since 1970. Of one with --log-format json."""
+        lines = re.findall(r"^\{.*\}$", self.log(), re.M)
+        return [
+            datetime.datetime.fromisoformat(entry["time"]).timestamp()
+            for entry in map(json.loads, lines)
+            if entry["message"] == message
+        ]
 
     def end(self, how: signal.Signals = signal.SIGKILL) -> int:
         """Its directory goes with it."""
