@@ -16,6 +16,11 @@ constexpr double kBoxDiagonals = 1;
 // violations at their beginning. Runs that converge need a few dozen in all.
 constexpr std::uint64_t kPatience = 100;
 constexpr double kShareLeft = 0.75;
+// Rounds on faces that break more than they fix end sooner: when violations are as many times those
+// at the beginning, and have not fallen to kShareLeft of their most for this many rounds, times k.
+// The longest such growth of a run that converged was 14 rounds.
+constexpr std::uint64_t kPatienceWithGrowth = 25;
+constexpr std::uint64_t kGrowth = 2;
 // After as many rounds of any kind, a manifold bends too much for epsilon if this share of the
 // stars does not close.
 constexpr double kHopelessShare = 0.5;
@@ -66,7 +71,7 @@ void BoxWatch::Warn(Certificate* certificate) const {
               "components that seeds lie on."));
 }
 
-bool StallWatch::HasStalled(std::uint64_t left, bool judges_all) {
+bool StallWatch::HasStalled(std::uint64_t left, bool judges_all, bool is_last) {
   const bool progress =
       front_moved_ || static_cast<double>(left) <= kShareLeft * static_cast<double>(left_then_);
   // Slivers and inconsistencies are counted from when sizes and shapes first hold.
@@ -77,7 +82,18 @@ bool StallWatch::HasStalled(std::uint64_t left, bool judges_all) {
     left_then_ = left;
     rounds_since_ = 0;
   }
-  return rounds_since_++ > kPatience * static_cast<std::uint64_t>(k_);
+  const bool grows = HasGrown(left, progress || begins) && !is_last;
+  return rounds_since_++ > kPatience * static_cast<std::uint64_t>(k_) || grows;
+}
+
+bool StallWatch::HasGrown(std::uint64_t left, bool progress) {
+  if (progress || static_cast<double>(left) <= kShareLeft * static_cast<double>(growing_to_)) {
+    growing_from_ = growing_to_ = left;
+    rounds_growing_ = 0;
+  }
+  growing_to_ = std::max(growing_to_, left);
+  return rounds_growing_++ > kPatienceWithGrowth * static_cast<std::uint64_t>(k_) &&
+         left >= kGrowth * std::max<std::uint64_t>(growing_from_, 1);
 }
 
 bool StallWatch::ShouldLookForLostCauses() {

@@ -32,7 +32,7 @@ class BoxWatch {
   double farthest_outside_ = 0;  // length
 };
 
-// Detects a run that would not end because its rounds break as many simplices as they fix.
+// Detects a run that would not end because its rounds break as many simplices as they fix, or more.
 class StallWatch {
  public:
   explicit StallWatch(int k) : k_(k) {}
@@ -40,8 +40,9 @@ class StallWatch {
   // Call it when a star on the advancing front was fixed since the last round.
   void NoteFrontMoved() { front_moved_ = true; }
   // Whether the last rounds have fixed little that their own points did not break again. Call it
-  // once a round. `left`: known violations; of R3 and R4 only if `judges_all`.
-  bool HasStalled(std::uint64_t left, bool judges_all);
+  // once a round. `left`: known violations; of R3 and R4 only if `judges_all`. Where others are
+  // left to do after these (not `is_last`), nor may rounds break more and more.
+  bool HasStalled(std::uint64_t left, bool judges_all, bool is_last = true);
   // Whether after many rounds most of the `stars` still break R1 or R2 (`bad` of them): a front
   // would be a small part of the mesh by then. Call it once a round.
   bool IsHopeless(std::uint64_t bad, std::uint64_t stars);
@@ -50,11 +51,16 @@ class StallWatch {
   bool ShouldLookForLostCauses();
 
  private:
+  // Whether `left` has grown since it last fell, or there was progress, for too many rounds.
+  bool HasGrown(std::uint64_t left, bool progress);
+
   int k_;
   bool front_moved_ = false;
   bool judged_all_ = false;                      // in the round before
   std::uint64_t left_then_ = ~std::uint64_t{0};  // violations, at the last progress
   std::uint64_t rounds_since_ = 0;
+  std::uint64_t growing_from_ = 0, growing_to_ = 0;  // violations: at the last fall, most since
+  std::uint64_t rounds_growing_ = 0;
   std::uint64_t rounds_since_front_ = 0;
   std::uint64_t rounds_ = 0;
 };
