@@ -17,6 +17,8 @@ template <int K>
 void FilledMesh<K>::Fill(const Stars<K>& stars, const ResolvedCriteria& criteria) {
   Clear();
   if (K < kFirstFilled || criteria.centre_rule != CentreRule::kCommonCentre) return;
+  // A cavity may reach from one label into another, and a tiling would not keep what is between.
+  if (!stars.sample().sectors().labels().empty()) return;
   cavities_ = FillCavities<K>(
       stars, {criteria.epsilon, criteria.radius_edge_bound, criteria.shape.sliver_bound});
 }

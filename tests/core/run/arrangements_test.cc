@@ -226,6 +226,34 @@ TEST(Arrangements, PinchedRegionsAreMeshedAndCalledSo) {
   }
 }
 
+// What of T^4 in R^8 is near a point, in two labels. Where stars of such a mesh disagreed a tiling
+// that knows no labels filled the cavity: what was between the labels had holes.
+TEST(Arrangements, FourDimensionsInCodimensionHaveLabels) {
+  Arrangement torus;
+  torus.domain.k = 4;
+  torus.domain.d = 8;
+  Eigen::VectorXd middle(8);
+  middle << 1, 0, 1, 0, 1, 0, 1, 0;
+  torus.domain.box = {(middle.array() - 0.9).matrix(), (middle.array() + 0.9).matrix()};
+  for (int circle = 0; circle < 4; ++circle) {
+    torus.domain.equations.push_back([circle](const Eigen::VectorXd& x, Eigen::VectorXd* gradient) {
+      if (gradient) {
+        gradient->setZero(8);
+        gradient->segment(2 * circle, 2) = x.segment(2 * circle, 2);
+      }
+      return (x.segment(2 * circle, 2).squaredNorm() - 1) / 2;
+    });
+  }
+  torus.domain.walls = {testing::HalfSpaceOf(middle / 2, -1.8),
+                        testing::HalfSpaceOf(Eigen::VectorXd::Unit(8, 1), 0)};
+  torus.label = [](auto s) { return s == 1 ? 1 : s == 3 ? 2 : 0; };
+  const auto mesh = MeshOf(torus.domain, torus.SpecificationFor(0.45));
+  EXPECT_EQ(WhyNot(mesh), "");
+  ASSERT_TRUE(mesh.has_value());
+  ASSERT_EQ(mesh->regions.size(), 2u);
+  for (const auto& [label, region] : mesh->regions) EXPECT_EQ(testing::EulerOf(region), 1) << label;
+}
+
 // Closures that do not hold, and tables that call impossible what there is, are refuted by name.
 TEST(Arrangements, WrongClosuresAreRefuted) {
   const Arrangement three = testing::PhaseArrangements()[0];

@@ -20,7 +20,7 @@ import stellate
 from families import FAMILIES, Case
 from judge import Finding, judge, judge_surface
 
-_LATE = ("four-torus in R^8, two labels",)  # half a minute each: asked for by name
+_LATE = ("cut four-torus in R^8, two labels",)  # half a minute each: asked for by name
 _MOST_VERTICES = 60_000
 
 
