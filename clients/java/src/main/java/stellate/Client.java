@@ -99,6 +99,7 @@ public final class Client implements AutoCloseable {
         builder
             .initialFlowControlWindow(WINDOW)
             .maxInboundMessageSize(LARGEST_MESSAGE)
+            .defaultServiceConfig(Shared.retries()) // a reply that was lost on the way
             .intercept(credentials.interceptor())
             .build();
     stub = StellateGrpc.newStub(channel);

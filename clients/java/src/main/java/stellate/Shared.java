@@ -1,7 +1,10 @@
 package stellate;
 
+import com.google.gson.Gson;
+import com.google.gson.reflect.TypeToken;
 import java.io.BufferedReader;
 import java.io.IOException;
+import java.io.InputStream;
 import java.io.InputStreamReader;
 import java.io.UncheckedIOException;
 import java.nio.charset.StandardCharsets;
@@ -15,9 +18,22 @@ final class Shared {
 
   private final Map<String, String> values = new HashMap<>();
 
+  /** A service config of gRPC, which takes it parsed. */
+  static Map<String, Object> retries() {
+    try (var reader = open("retries.json")) {
+      return new Gson().fromJson(reader, new TypeToken<Map<String, Object>>() {}.getType());
+    } catch (IOException error) {
+      throw new UncheckedIOException(error);
+    }
+  }
+
+  private static BufferedReader open(String name) {
+    InputStream table = Shared.class.getResourceAsStream("/stellate/shared/" + name);
+    return new BufferedReader(new InputStreamReader(table, StandardCharsets.UTF_8));
+  }
+
   private Shared(String name) {
-    try (var table = Shared.class.getResourceAsStream("/stellate/shared/" + name);
-        var reader = new BufferedReader(new InputStreamReader(table, StandardCharsets.UTF_8))) {
+    try (var reader = open(name)) {
       for (String line = reader.readLine(); line != null; line = reader.readLine()) {
         String[] parts = line.replaceFirst("#.*", "").split("=", 2);
         if (parts.length == 2) {

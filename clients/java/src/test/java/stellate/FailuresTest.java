@@ -11,6 +11,8 @@ import java.nio.channels.ClosedChannelException;
 import java.nio.file.Files;
 import java.nio.file.Path;
 import java.util.List;
+import java.util.Set;
+import java.util.TreeSet;
 import java.util.concurrent.CopyOnWriteArrayList;
 import java.util.concurrent.atomic.AtomicBoolean;
 import java.util.stream.DoubleStream;
@@ -107,6 +109,26 @@ final class FailuresTest {
     }
     try (Client client = new Client(address, Credentials.NONE)) {
       assertEquals(Kind.UNAVAILABLE, thrown(client::info).kind());
+    }
+  }
+
+  @Test
+  void aReplyThatIsLostCostsNothing() throws Exception {
+    try (Live.RestartingServer server = Live.RestartingServer.lossy()) {
+      Set<String> names = new TreeSet<>();
+      for (int i = 0; i < 6; i++) {
+        // A client each: its first call may be the one whose reply is lost.
+        try (Client client = new Client(server.address, Credentials.NONE).reconnectSeconds(0)) {
+          names.add(client.create(Live.TORUS, 0.2, new Options()).getName());
+        }
+      }
+      for (int i = 0; i < 2; i++) {
+        try (Client client = new Client(server.address, Credentials.NONE).reconnectSeconds(0)) {
+          List<String> there = client.list().stream().map(mesh -> mesh.getName()).sorted().toList();
+          assertEquals(List.copyOf(names), there);
+          assertEquals(6, there.size());
+        }
+      }
     }
   }
 

@@ -64,16 +64,25 @@ final class Live {
     };
   }
 
-  /** A server that can be killed and started again. */
+  /** A server that can be killed and started again; or one that loses replies. */
   static final class RestartingServer implements AutoCloseable {
     final String address;
     private final Process process;
     private final OutputStream in;
 
     RestartingServer(String... flags) throws IOException {
+      this("STELLATE_TEST_RESTARTING_SERVER", List.of(flags));
+    }
+
+    /** One behind a proxy that loses every second reply. */
+    static RestartingServer lossy() throws IOException {
+      return new RestartingServer("STELLATE_TEST_LOSSY_SERVER", List.of());
+    }
+
+    private RestartingServer(String program, List<String> flags) throws IOException {
       List<String> command = new ArrayList<>();
-      command.add(fromEnvironment("STELLATE_TEST_RESTARTING_SERVER"));
-      command.addAll(List.of(flags));
+      command.add(fromEnvironment(program));
+      command.addAll(flags);
       process = new ProcessBuilder(command).start();
       in = process.getOutputStream();
       BufferedReader out = process.inputReader(StandardCharsets.UTF_8);
