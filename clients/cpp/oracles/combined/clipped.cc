@@ -1,9 +1,12 @@
 #include <cmath>
+#include <optional>
 #include <utility>
 
 #include "oracles/combined/common.h"
 #include "oracles/combined/level_solver.h"
+#include "oracles/equation_system.h"
 #include "oracles/exactness.h"
+#include "stellate/implicit.h"
 #include "stellate/oracles/walls.h"
 
 namespace stellate::oracles {
@@ -46,6 +49,28 @@ void CheckFace(const Walls& face, int walls) {
     }
     last = wall;
   }
+}
+
+// Nearest points of M = {F = 0} where the level's functions are zero, too: equations of one system.
+Answer OntoBoth(const EquationSystem& whole, const Level& level, int count, const MatrixXd& x) {
+  if (x.rows() < whole.equations() + count) {
+    Refuse(std::to_string(count) + " equations on a manifold of dimension " +
+           std::to_string(x.rows() - whole.equations()) + " leave none");
+  }
+  const EquationSystem both = whole.With(level.f, level.slopes, count);
+  Answer answer{x, std::vector<std::uint8_t>(static_cast<size_t>(x.cols()), 0), {}, {}};
+  for (Index j = 0; j < x.cols(); ++j) {
+    const VectorXd at = x.col(j);
+    std::optional<VectorXd> nearest = NearestZero(both, at, at);
+    if (!nearest) {  // on the way: once more, from M
+      const std::optional<VectorXd> start = NearestZero(whole, at, at);
+      if (start) nearest = NearestZero(both, at, *start);
+    }
+    if (!nearest) continue;
+    answer.points.col(j) = *nearest;
+    answer.found[static_cast<size_t>(j)] = 1;
+  }
+  return answer;
 }
 
 }  // namespace
@@ -158,7 +183,9 @@ Answer Clipped::FacePoint(const MatrixXd& x, const Walls& face) {
                       return slopes;
                     },
                     scale_};
-  return OntoLevel(*base_, level, x);
+  const auto* const equations = dynamic_cast<const ImplicitOracle*>(base_.get());
+  return equations != nullptr ? OntoBoth(equations->system(), level, static_cast<int>(count), x)
+                              : OntoLevel(*base_, level, x);
 }
 
 MatrixXd Clipped::Clearances(const MatrixXd& points) {
