@@ -30,8 +30,30 @@ fn constants(name: &str) -> std::io::Result<String> {
     Ok(module + "}\n")
 }
 
+/// A module of the numbers of retries.json, a service config of gRPC, which tonic does not take: "0.1s" is 0.1.
+fn retries() -> std::io::Result<String> {
+    let path = format!("{}/retries.json", within("shared", "../shared"));
+    println!("cargo:rerun-if-changed={path}");
+    let text = std::fs::read_to_string(&path)?;
+    let mut module = String::from("pub mod retries {\n");
+    for (key, name) in [
+        ("maxAttempts", "MAX_ATTEMPTS"),
+        ("initialBackoff", "INITIAL_BACKOFF"),
+        ("maxBackoff", "MAX_BACKOFF"),
+        ("backoffMultiplier", "BACKOFF_MULTIPLIER"),
+    ] {
+        let parts: Vec<&str> = text.split(&format!("\"{key}\":")).collect();
+        assert_eq!(parts.len(), 2, "{path}: one policy, with one {key}");
+        let value = parts[1].split([',', '}']).next().unwrap_or_default();
+        let number = value.trim().trim_matches('"').trim_end_matches('s').parse::<f64>();
+        let number = number.unwrap_or_else(|error| panic!("{path}: {key}: {error}"));
+        writeln!(module, "pub const {name}: f64 = {number:?};").expect("a string takes it");
+    }
+    Ok(module + "}\n")
+}
+
 fn main() -> std::io::Result<()> {
-    let shared = constants("reconnect")? + &constants("checkpoint")?;
+    let shared = constants("reconnect")? + &constants("checkpoint")? + &retries()?;
     let folder = std::env::var("OUT_DIR").expect("cargo sets it");
     std::fs::write(format!("{folder}/shared.rs"), shared)?;
     let protos = within("proto", "../../proto");

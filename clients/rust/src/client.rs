@@ -241,7 +241,7 @@ impl Client {
         });
         match call.await {
             // An attempt whose answer was lost has done it.
-            Err(error) if &*error.reason == "MESH_NOT_FOUND" && outage.lasts() => Ok(()),
+            Err(error) if &*error.reason == "MESH_NOT_FOUND" && outage.repeats() => Ok(()),
             deleted => deleted,
         }
     }

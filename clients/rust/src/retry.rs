@@ -9,7 +9,7 @@ use tokio::sync::watch;
 use tonic::{Code, Status};
 
 use crate::error::{Error, Kind};
-use crate::shared::reconnect;
+use crate::shared::{reconnect, retries};
 
 /// Whether the server, or the way to it, was lost, so that the same call may succeed later. What a
 /// server drops arrives as CANCELLED where this side cancelled nothing.
@@ -60,12 +60,20 @@ pub struct Outage<'a> {
     quiet: bool,
     pub stopped: Flag,
     attempts: u32,
+    /// Attempts since a reply was lost, where no server is waited for.
+    repeats: u32,
     lost_at: Instant,
+}
+
+/// A pause that is shortened at random: the clients of a server that comes back do not come all together.
+fn shortened(pause: Duration, jitter: f64) -> Duration {
+    let chance = RandomState::new().build_hasher().finish() as f64 / u64::MAX as f64;
+    pause.mul_f64(1.0 - jitter * chance)
 }
 
 impl<'a> Outage<'a> {
     pub fn new(patience: &'a Patience, quiet: bool, stopped: Flag) -> Self {
-        Outage { patience, quiet, stopped, attempts: 0, lost_at: Instant::now() }
+        Outage { patience, quiet, stopped, attempts: 0, repeats: 0, lost_at: Instant::now() }
     }
 
     /// Whether the attempt under way follows on one that was broken off.
@@ -73,9 +81,15 @@ impl<'a> Outage<'a> {
         self.attempts > 0
     }
 
+    /// Whether an attempt before this one may have done what was asked.
+    pub fn repeats(&self) -> bool {
+        self.attempts + self.repeats > 0
+    }
+
     /// The attempt brought something: the server is there.
     pub fn heard(&mut self) {
         self.patience.reached.store(true, Ordering::Relaxed);
+        self.repeats = 0;
         if self.attempts > 0 {
             let seconds = self.lost_at.elapsed().as_secs_f64();
             self.tell(&format!("the server is back after {seconds:.1} s"));
@@ -109,15 +123,16 @@ impl<'a> Outage<'a> {
         if &*ours.reason == "SHUTTING_DOWN" {
             self.patience.reached.store(true, Ordering::Relaxed); // said by a server
         }
-        if self.stopped.is_set() || !self.patience.reached.load(Ordering::Relaxed) {
+        if self.stopped.is_set() {
             return Err(ours);
         }
         let most = self.patience.give_up;
+        if most.is_zero() || !self.patience.reached.load(Ordering::Relaxed) {
+            return self.repeat(ours).await;
+        }
         if self.attempts == 0 {
             self.lost_at = Instant::now();
-            if !most.is_zero() {
-                self.tell(&format!("lost the server ({ours}): trying again for up to {most:?}"));
-            }
+            self.tell(&format!("lost the server ({ours}): trying again for up to {most:?}"));
         }
         let gone = self.lost_at.elapsed();
         if gone >= most {
@@ -129,12 +144,26 @@ impl<'a> Outage<'a> {
         let longer = reconnect::PAUSE_GROWTH.powf(f64::from(self.attempts));
         let full = Duration::from_secs_f64((reconnect::FIRST_PAUSE * longer).min(reconnect::LONGEST_PAUSE));
         self.attempts += 1;
-        // Shortened at random: the clients of a server that comes back do not come all together.
-        let chance = RandomState::new().build_hasher().finish() as f64 / u64::MAX as f64;
-        let pause = full.mul_f64(1.0 - reconnect::PAUSE_JITTER * chance).min(most - gone);
+        self.pause(shortened(full, reconnect::PAUSE_JITTER).min(most - gone), ours).await
+    }
+
+    /// Where no server is waited for, its reply may still have been lost on the way: a few attempts within a
+    /// second, as gRPC's other libraries make them by the same numbers.
+    async fn repeat(&mut self, ours: Error) -> Result<(), Error> {
+        if f64::from(self.repeats + 1) >= retries::MAX_ATTEMPTS {
+            return Err(ours);
+        }
+        let longer = retries::BACKOFF_MULTIPLIER.powf(f64::from(self.repeats));
+        let full = Duration::from_secs_f64((retries::INITIAL_BACKOFF * longer).min(retries::MAX_BACKOFF));
+        self.repeats += 1;
+        self.pause(shortened(full, reconnect::PAUSE_JITTER), ours).await
+    }
+
+    /// Ok after that time, unless it is stopped before.
+    async fn pause(&self, time: Duration, ours: Error) -> Result<(), Error> {
         tokio::select! {
             () = self.stopped.wait() => Err(ours),
-            () = tokio::time::sleep(pause) => Ok(()),
+            () = tokio::time::sleep(time) => Ok(()),
         }
     }
 }

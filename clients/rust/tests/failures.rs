@@ -5,6 +5,7 @@ mod live;
 use std::panic::{catch_unwind, AssertUnwindSafe};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex};
+use std::time::Duration;
 
 use live::{counts, expected, meshed, RestartingServer, Spoilt};
 use stellate::manifolds::{ProductOfCircles, Torus};
@@ -94,6 +95,25 @@ fn a_server_that_comes_back_is_waited_for() {
     drop(server);
     let gone = meshed(&Torus::default(), Connection::Server(&address, ClientOptions::default()));
     assert_eq!(gone.unwrap_err().kind, Kind::Unavailable);
+}
+
+#[test]
+fn a_reply_that_is_lost_costs_nothing() {
+    let server = RestartingServer::lossy();
+    // A client each: its first call may be the one whose reply is lost.
+    let client = || {
+        let options = ClientOptions { reconnect: Duration::ZERO, ..Default::default() };
+        Client::new(&server.address, options).unwrap()
+    };
+    let make = |_| client().create(&Torus::default(), 0.2, &MeshOptions::default()).unwrap().name;
+    let mut names: Vec<String> = (0..6).map(make).collect();
+    names.sort();
+    let listed = || client().list().unwrap().into_iter().map(|mesh| mesh.name);
+    let mut there: Vec<String> = listed().collect();
+    there.sort();
+    assert_eq!(there, names, "each once");
+    names.iter().for_each(|name| client().delete(name).unwrap());
+    assert_eq!(listed().count(), 0);
 }
 
 #[test]

@@ -33,7 +33,7 @@ pub fn meshed(oracle: &dyn Oracle, connection: Connection) -> Result<Mesh, Error
     stellate::mesh(oracle, 0.1, RunOptions { connection, ..Default::default() })
 }
 
-/// A server that can be killed and started again.
+/// A server that can be killed and started again; or one that loses replies.
 pub struct RestartingServer {
     pub address: String,
     child: Child,
@@ -41,7 +41,16 @@ pub struct RestartingServer {
 
 impl RestartingServer {
     pub fn start(flags: &[&str]) -> Self {
-        let mut child = Command::new(from_environment("STELLATE_TEST_RESTARTING_SERVER"))
+        Self::run("STELLATE_TEST_RESTARTING_SERVER", flags)
+    }
+
+    /// One behind a proxy that loses every second reply.
+    pub fn lossy() -> Self {
+        Self::run("STELLATE_TEST_LOSSY_SERVER", &[])
+    }
+
+    fn run(program: &str, flags: &[&str]) -> Self {
+        let mut child = Command::new(from_environment(program))
             .args(flags)
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
