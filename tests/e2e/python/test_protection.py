@@ -104,6 +104,23 @@ def test_an_unprotected_torus_changes(torus):
     assert any(found != simplices_of(plain) for found in trials)
 
 
+def test_a_shaken_3_sphere_changes_by_no_less_than_the_report_says():
+    """The stars of points of a sphere are their hull. Moves as large as the gaps are use these up."""
+    epsilon, protection = 0.4, 0.02
+    mesh = stellate.mesh(manifolds.Sphere(3), epsilon, protection=protection)
+    proved = mesh.report.certificate.protection.stability_radius
+    assert mesh.report.certificate.protection.weak == 0
+    assert 0 < proved < protection * epsilon
+    want, rng = simplices_of(mesh), np.random.default_rng(1)
+
+    def stays(length):
+        moved, _ = shaken(manifolds.Sphere(3), mesh, length, rng)
+        return {tuple(map(int, sorted(one))) for one in ConvexHull(moved).simplices} == want
+
+    assert all(stays(proved) for _ in range(20))
+    assert not all(stays(protection * epsilon) for _ in range(20))
+
+
 def intrinsic(points):
     """The Delaunay triangulation of a flat torus, by that of its copies in the plane."""
     angles = np.arctan2(points[:, 1::2], points[:, ::2])
