@@ -118,6 +118,45 @@ TEST_F(SolidsFromCpp, MaterialsAreRegionsInMeshesDownloadsAndFiles) {
   EXPECT_EQ(fetched->region_names, composite.names());
 }
 
+// Three grains about as many centres: the largest function is that of the nearest one.
+TEST_F(SolidsFromCpp, PhasesMeetAlongAnEdge) {
+  const std::vector<Vector3d> centres = {
+      {0.98, 0.2, 0.02}, {-0.67, 0.75, 0.23}, {-0.3, -0.95, 0.44}};
+  std::vector<solids::Phase> grains;
+  for (const Vector3d& centre : centres)
+    grains.push_back({[centre](const Eigen::VectorXd& x) { return -(x - centre).squaredNorm(); }});
+  grains[2].name = "salt";
+  solids::Phases phases(grains, Ball());
+  const Expected<Mesh> mesh = MeshManifold(phases, At(0.25));
+  ASSERT_TRUE(mesh.has_value()) << mesh.error().message;
+  EXPECT_TRUE(mesh->report.certified()) << mesh->report.text;
+  EXPECT_EQ(mesh->region_names, (std::vector<std::string>{"", "", "salt"}));
+  double volume = 0;
+  for (int label = 1; label <= 3; ++label) {
+    const Mesh grain = mesh->Region(label);
+    EXPECT_EQ(Euler(grain.simplices), 1);
+    volume += Volume(grain);
+    for (const auto& simplex : grain.simplices.colwise()) {
+      Vector3d middle = Vector3d::Zero();
+      for (const std::uint32_t id : simplex) middle += mesh->points.col(id) / 4;
+      EXPECT_EQ(phases.LabelAt(middle), label);
+    }
+  }
+  EXPECT_NEAR(volume, 4 * std::numbers::pi / 3, 0.3);
+  // Of the three edges on the ball and the one inside, this is where all three walls are zero.
+  int inner = 0;
+  for (const Face& edge : mesh->edges()) {
+    if (edge.walls != Walls{0, 1, 2}) continue;
+    ++inner;
+    for (const std::uint32_t id : edge.simplices.reshaped()) {
+      const Vector3d x = mesh->points.col(id);
+      EXPECT_NEAR((x - centres[0]).norm(), (x - centres[1]).norm(), 1e-9);
+      EXPECT_NEAR((x - centres[0]).norm(), (x - centres[2]).norm(), 1e-9);
+    }
+  }
+  EXPECT_EQ(inner, 1);
+}
+
 // The boundary alone has the labels on both sides, closed surfaces of regions, creases and groups.
 TEST_F(SolidsFromCpp, TheBoundaryAloneHasSidesAndCreases) {
   Labels composite({{"matrix", Box(-kOne, kOne)}, {"grain", Ball(0.6)}});

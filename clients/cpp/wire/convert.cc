@@ -98,8 +98,10 @@ Expected<void> CheckLabels(const std::vector<std::uint8_t>& labels, int walls) {
                    std::to_string(walls) + " walls have 2^" + std::to_string(walls) +
                    " vectors of signs: give one for each");
   }
-  if (*std::max_element(labels.begin(), labels.end()) > kHighestLabel) {
-    return Invalid("labels have to be numbers from 0, outside of M, to 127");
+  if (std::any_of(labels.begin(), labels.end(), [](std::uint8_t label) {
+        return label > kHighestLabel && label != Oracle::kNoSuchSigns;
+      })) {
+    return Invalid("labels have to be numbers from 0, outside of M, to 127, or kNoSuchSigns");
   }
   return {};
 }
@@ -161,6 +163,10 @@ Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
   spec.set_walls(static_cast<std::uint32_t>(oracle.walls()));
   const std::vector<std::uint8_t> labels = oracle.labels();
   spec.set_labels(labels.data(), labels.size());
+  for (const Walls& closure : oracle.closures()) {
+    auto* const walls = spec.add_closures();
+    for (const int wall : closure) walls->add_walls(static_cast<std::uint32_t>(wall));
+  }
   for (std::string& name : oracle.region_names()) spec.add_region_names(std::move(name));
   if (const auto box = oracle.bounding_box()) {
     // Shape [d]: a corner is one point, not a list of them.

@@ -36,7 +36,10 @@ const ListValue& List(const Struct& of, const std::string& name) {
 
 std::string Signs(const auto& labels) {
   std::string signs;
-  for (const int label : labels) signs += label < 0 ? "-" : std::to_string(label);
+  for (const auto label : labels) {
+    const int number = static_cast<std::int8_t>(label);
+    signs += number < 0 ? "-" : std::to_string(number);
+  }
   return signs;
 }
 
@@ -100,6 +103,73 @@ TEST(Solids, HaveTheWallsAndLabelsThatPythonHas) {
     }
   }
   EXPECT_GE(seen, 19);
+}
+
+Phase NearTo(const Vector3d& centre, double lowered = 0) {
+  return {[=](const VectorXd& x) { return -(x - centre).squaredNorm() - lowered; },
+          [=](const VectorXd& x) -> VectorXd { return -2 * (x - centre); }};
+}
+
+TEST(Phases, HaveTheWallsLabelsAndClosuresThatPythonHas) {
+  const Struct shared = Shared();
+  int seen = 0;
+  for (const auto& value : List(shared, "phases").values()) {
+    const Struct& want = value.struct_value();
+    const std::string within = want.fields().at("within").string_value();
+    SCOPED_TRACE(within);
+    std::vector<Phase> grains;
+    for (const auto& numbers : List(want, "grains").values()) {
+      const ListValue& grain = numbers.list_value();
+      const auto at = [&grain](int i) { return grain.values(i).number_value(); };
+      grains.push_back(NearTo({at(0), at(1), at(2)}, at(3)));
+    }
+    Phases phases(grains, ParseSolid(within).value());
+    EXPECT_EQ(Signs(phases.labels()), want.fields().at("labels").string_value());
+    const std::vector<Walls> closures = phases.closures();
+    ASSERT_EQ(std::ssize(closures), List(want, "closures").values_size());
+    for (int i = 0; i < std::ssize(closures); ++i) {
+      const ListValue& walls = List(want, "closures").values(i).list_value();
+      ASSERT_EQ(walls.values_size(), 3);
+      for (int j = 0; j < 3; ++j) {
+        EXPECT_EQ(closures[static_cast<size_t>(i)][static_cast<size_t>(j)],
+                  walls.values(j).number_value());
+      }
+    }
+    ASSERT_EQ(phases.walls(), List(want, "clearances").values_size());
+    for (int j = 0; j < List(shared, "places").values_size(); ++j) {
+      const ListValue& place = List(shared, "places").values(j).list_value();
+      Vector3d x;
+      for (int i = 0; i < 3; ++i) x[i] = place.values(i).number_value();
+      EXPECT_EQ(phases.LabelAt(x), List(want, "label_at").values(j).number_value());
+      const MatrixXd clearances = phases.Clearances(x);
+      for (int wall = 0; wall < phases.walls(); ++wall) {
+        const ListValue& of_wall = List(want, "clearances").values(wall).list_value();
+        EXPECT_NEAR(clearances(wall, 0), of_wall.values(j).number_value(), 1e-12) << wall;
+      }
+    }
+    ++seen;
+  }
+  EXPECT_GE(seen, 3);
+}
+
+// The edge of three phases is asked for by all three walls, of which any two are enough.
+TEST(Phases, FindTheEdgesAndCornersWhereSeveralMeet) {
+  const std::vector<Vector3d> centres = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -0.9}, {-1, -1.1, 1}};
+  std::vector<Phase> grains;
+  for (const Vector3d& centre : centres) grains.push_back(NearTo(centre));
+  Phases phases(grains, Ball(1));
+  const Vector3d x(0.3, 0.2, -0.1);
+  for (const Walls& face : {Walls{0, 1, 3}, Walls{0, 1, 2, 3, 4, 5}}) {
+    const Answer answer = phases.FacePoint(x, face);
+    ASSERT_TRUE(answer.IsFound(0));
+    for (const int wall : face) {
+      EXPECT_NEAR(phases.Clearances(answer.points)(wall, 0), 0, 1e-12) << wall;
+    }
+    EXPECT_EQ(phases.Conormals(answer.points, face).rows(), 3 * std::ssize(face));
+  }
+  EXPECT_TRUE(phases.region_names().empty());
+  grains[1].name = "salt";
+  EXPECT_EQ(Phases(grains, Ball(1)).region_names(), (std::vector<std::string>{"", "salt", "", ""}));
 }
 
 // By differences of their values, at random points.
@@ -171,6 +241,19 @@ TEST(Solids, WhatCannotBeIsRefusedInWords) {
        })},
       {"no material 'c'", RefusalOf([] {
          Labels({{"a", Ball()}}).LabelOf("c");
+       })},
+      {"two to six functions, and these are 1", RefusalOf([] { Phases({NearTo(kX)}, Ball()); })},
+      {"one of them is none", RefusalOf([] {
+         Phases({NearTo(kX), {}}, Ball());
+       })},
+      {"6 phases have 15 walls, and what they fill has 6; there may be 16 together",
+       RefusalOf([&] { Phases(std::vector<Phase>(6, NearTo(kX)), box).walls(); })},
+      {"goes on without end", RefusalOf([] {
+         Phases({NearTo(kX), NearTo(kZ)}, ~Ball()).walls();
+       })},
+      {"there is no wall 2", RefusalOf([&] {
+         oracles::Solid(std::vector<oracles::Wall>(2, oracles::Ball(0 * kX, 1)), {-kOne, kOne}, {},
+                        {0, 1, 2, 3}, {{0, 1, 2}});
        })},
   };
   for (const auto& [words, refusal] : refusals) {

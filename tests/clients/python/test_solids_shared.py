@@ -71,6 +71,13 @@ _CASES = {
     ),
 }
 
+# Each is the largest where its centre is the nearest, less what it is lowered by; within a solid.
+_PHASES = {
+    "ball(1)": [[0.8, 0.2, 0.1, 0], [-0.5, 0.7, -0.2, 0.1], [-0.3, -0.8, 0.3, 0]],
+    "torus(1, 0.4)": [[1, 1, 1, 0], [1, -1, -1, 0.2], [-1, 1, -0.9, 0], [-1, -1.1, 1, 0]],
+    "box(-1, 1) - cylinder(0.3)": [[0.5, 0, 0, 0], [-0.5, 0.1, 0, 0]],
+}
+
 
 def _signs(labels):
     """A character for each vector of signs."""
@@ -96,6 +103,34 @@ def _record(expression):
     return case
 
 
+def _record_phases(within):
+    def grain(centre):
+        return lambda x: -((x - np.array(centre[:3])) ** 2).sum(axis=1) - centre[3]
+
+    solids = {
+        "ball(1)": s.Ball(1),
+        "torus(1, 0.4)": s.Torus(1, 0.4),
+        "box(-1, 1) - cylinder(0.3)": s.Box([-1] * 3, [1] * 3) - s.Cylinder(0.3),
+    }
+    phases = s.Phases(*map(grain, _PHASES[within])) & solids[within]
+    return {
+        "within": within,
+        "grains": _PHASES[within],
+        "clearances": phases.clearances(np.array(_PLACES)).T.tolist(),
+        "labels": _signs(phases.labels),
+        "closures": [list(closure) for closure in phases.closures],
+        "label_at": phases.label_at(np.array(_PLACES)).tolist(),
+    }
+
+
+@pytest.mark.parametrize("number", range(len(_PHASES)))
+def test_phases_are_as_recorded(number):
+    want = json.loads(_FILE.read_text())["phases"][number]
+    have = _record_phases(list(_PHASES)[number])
+    assert np.allclose(have.pop("clearances"), want.pop("clearances"), rtol=0, atol=1e-12)
+    assert have == want
+
+
 @pytest.mark.parametrize("number", range(len(_CASES)))
 def test_solids_are_as_recorded(number):
     shared = json.loads(_FILE.read_text())
@@ -113,5 +148,8 @@ def test_solids_are_as_recorded(number):
 
 if __name__ == "__main__":
     cases = ",\n".join(json.dumps(_record(expression)) for expression in _CASES)
+    phases = ",\n".join(json.dumps(_record_phases(within)) for within in _PHASES)
     places = json.dumps(_PLACES)
-    _FILE.write_text(f'{{"places": {places},\n"cases": [\n{cases}\n]}}\n')
+    _FILE.write_text(
+        f'{{"places": {places},\n"cases": [\n{cases}\n],\n"phases": [\n{phases}\n]}}\n'
+    )

@@ -63,6 +63,8 @@ class OracleError : public std::runtime_error {
 // run and reaches the caller of MeshManifold unchanged.
 class Oracle {
  public:
+  static constexpr std::uint8_t kNoSuchSigns = 255;  // among labels
+
   virtual ~Oracle() = default;
 
   virtual int dimension() const = 0;          // k
@@ -126,9 +128,14 @@ class Oracle {
 
   // An arrangement: M is not where all walls are positive, but consists of a region for each label
   // from 1 to 127. One for each of the 2^walls() vectors of the walls' signs, in whose number bit i
-  // is set where g_i >= 0; 0 is outside of M. All regions are meshed together, and Mesh::labels
-  // says which simplex is in which. At most 16 walls may have labels. Empty: no arrangement.
+  // is set where g_i >= 0; 0 is outside of M, and kNoSuchSigns stands for a vector that no point
+  // has. All regions are meshed together, and Mesh::labels says which simplex is in which. At most
+  // 16 walls may have labels. Empty: no arrangement.
   virtual std::vector<std::uint8_t> labels() const { return {}; }
+  // Sets of walls with labels, for walls that depend on each other: each of a set, of three or
+  // more, is zero wherever all others of it are, as f - g, g - h and f - h are. A face is then
+  // asked for with all walls that are zero on it, although some follow from others.
+  virtual std::vector<Walls> closures() const { return {}; }
   // The names of the regions with the labels 1, 2, ..., for people and for groups in files; an
   // empty one is none. At most 128 bytes each.
   virtual std::vector<std::string> region_names() const { return {}; }

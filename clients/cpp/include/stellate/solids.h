@@ -41,6 +41,7 @@ class Composed : public Oracle {
   }
   int walls() const override { return made().walls(); }
   std::vector<std::uint8_t> labels() const override { return made().labels(); }
+  std::vector<Walls> closures() const override { return made().closures(); }
   Answer FacePoint(const Eigen::MatrixXd& x, const Walls& face) override {
     return made().FacePoint(x, face);
   }
@@ -130,6 +131,38 @@ class Labels final : public Composed {
 
  private:
   std::vector<std::string> names_;
+};
+
+// A material, as it competes with others for a point.
+struct Phase {
+  std::function<double(const Eigen::VectorXd& x)> f;  // smooth near where it is among the largest
+  std::function<Eigen::VectorXd(const Eigen::VectorXd& x)> gradient = {};  // empty: differences
+  std::string name = {};
+};
+
+// Materials that fill a solid: label i + 1 where function i is the largest.
+//
+//   const s::Phases grains({{f}, {g}, {h}}, s::Ball());
+//   const auto mesh = stellate::MeshManifold(grains, options);  // mesh->labels: 1, 2 or 3
+//
+// Three materials meet along edges, four in points, at whatever angles. The walls between two of
+// them have to cross at an angle there, and their functions must not be equal anywhere else than on
+// a smooth surface. Wall by wall these are f0 - f1, f0 - f2, ..., f1 - f2, ...; then the solid's.
+class Phases final : public Composed {
+ public:
+  // Two to six phases; there may be 16 walls at most.
+  Phases(std::vector<Phase> phases, const Solid& within);
+
+  // What of them is in another solid, too.
+  Phases operator&(const Solid& other) const { return {phases_, within_ & other}; }
+
+  // 0 outside of what they fill.
+  int LabelAt(const Eigen::VectorXd& x) const;
+  std::vector<std::string> region_names() const override;
+
+ private:
+  std::vector<Phase> phases_;
+  Solid within_;
 };
 
 // A ball of R^d, any d: one wall.

@@ -1,5 +1,6 @@
 #include <cmath>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "oracles/combined/common.h"
@@ -106,11 +107,12 @@ Wall Ball(const VectorXd& centre, double radius) {
 }
 
 Clipped::Clipped(std::shared_ptr<Oracle> oracle, std::vector<Wall> walls, MatrixXd seeds,
-                 std::vector<std::uint8_t> labels)
+                 std::vector<std::uint8_t> labels, std::vector<Walls> closures)
     : base_(std::move(oracle)),
       walls_(std::move(walls)),
       seeds_(std::move(seeds)),
-      labels_(std::move(labels)) {
+      labels_(std::move(labels)),
+      closures_(std::move(closures)) {
   if (base_ == nullptr) Refuse("there is no oracle to clip");
   if (const auto* const clipped = dynamic_cast<const Clipped*>(base_.get())) {
     if (!clipped->labels_.empty()) {
@@ -134,6 +136,13 @@ Clipped::Clipped(std::shared_ptr<Oracle> oracle, std::vector<Wall> walls, Matrix
            " labels; there has to be one for each of "
            "the vectors of signs of at most 16 walls");
   }
+  for (const Walls& closure : closures_) {
+    for (const int wall : closure) {
+      if (wall < 0 || wall >= std::ssize(walls_)) {
+        Refuse("closures are sets of walls, and there is no wall " + std::to_string(wall));
+      }
+    }
+  }
   if (seeds_.size() == 0) seeds_ = base_->seeds();
   if (seeds_.size() > 0 && seeds_.rows() != ambient_dimension()) {
     Refuse("seeds have to be points of R^" + std::to_string(ambient_dimension()));
@@ -156,6 +165,29 @@ bool Clipped::has_intersect_flat() const {
   return base_->has_intersect_flat() && dimension() < ambient_dimension();
 }
 
+// Walls of a face from which all others of it follow.
+Walls Clipped::Independent(const Walls& face) const {
+  Walls chosen;
+  std::set<int> zero;
+  const auto follows = [&] {
+    for (const Walls& closure : closures_) {
+      std::set<int> rest;
+      for (const int wall : closure) {
+        if (!zero.contains(wall)) rest.insert(wall);
+      }
+      if (rest.size() == 1) return zero.insert(*rest.begin()).second;
+    }
+    return false;
+  };
+  for (const int wall : face) {
+    if (!zero.insert(wall).second) continue;
+    chosen.push_back(wall);
+    while (follows()) {
+    }
+  }
+  return chosen;
+}
+
 VectorXd Clipped::Slope(int wall, const VectorXd& x) const {
   const Wall& it = walls_[static_cast<size_t>(wall)];
   if (it.gradient) return it.gradient(x);
@@ -163,9 +195,10 @@ VectorXd Clipped::Slope(int wall, const VectorXd& x) const {
   return Differences(f, x, scale_).row(0).transpose();
 }
 
-Answer Clipped::FacePoint(const MatrixXd& x, const Walls& face) {
-  CheckFace(face, walls());
-  for (const int wall : face) InsistOnExactness(wall);
+Answer Clipped::FacePoint(const MatrixXd& x, const Walls& asked) {
+  CheckFace(asked, walls());
+  for (const int wall : asked) InsistOnExactness(wall);
+  const Walls face = Independent(asked);
   const auto count = static_cast<Index>(face.size());
   const Level level{[&](const VectorXd& y) {
                       VectorXd values(count);
@@ -221,8 +254,8 @@ MatrixXd Clipped::Conormals(const MatrixXd& points, const Walls& face) {
 }
 
 Solid::Solid(std::vector<Wall> walls, BoundingBox around, MatrixXd seeds,
-             std::vector<std::uint8_t> labels)
+             std::vector<std::uint8_t> labels, std::vector<Walls> closures)
     : Clipped(std::make_shared<Space>(std::move(around)), std::move(walls), std::move(seeds),
-              std::move(labels)) {}
+              std::move(labels), std::move(closures)) {}
 
 }  // namespace stellate::oracles

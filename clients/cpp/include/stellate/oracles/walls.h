@@ -43,14 +43,15 @@ class Clipped : public Oracle {
   // Of M, with tangent bases; 1 to 64 walls. Those of an oracle that is Clipped itself come first.
   // `seeds` (d x s) are points near what is left, where M's box or seeds are not to be gone by.
   // `labels`, as Oracle::labels has them: the part of M with labels other than 0 instead of what is
-  // positive. What has labels cannot be clipped.
+  // positive. What has labels cannot be clipped. `closures` as Oracle::closures has them.
   Clipped(std::shared_ptr<Oracle> oracle, std::vector<Wall> walls, Eigen::MatrixXd seeds = {},
-          std::vector<std::uint8_t> labels = {});
+          std::vector<std::uint8_t> labels = {}, std::vector<Walls> closures = {});
 
   int dimension() const override { return base_->dimension(); }
   int ambient_dimension() const override { return base_->ambient_dimension(); }
   int walls() const override { return static_cast<int>(walls_.size()); }
   std::vector<std::uint8_t> labels() const override { return labels_; }
+  std::vector<Walls> closures() const override { return closures_; }
   // Of M, whatever the walls say.
   Answer ClosestPoint(const Eigen::MatrixXd& x) override { return base_->ClosestPoint(x); }
   bool has_intersect_flat() const override;
@@ -79,6 +80,7 @@ class Clipped : public Oracle {
 
  private:
   void InsistOnExactness(int wall) const;
+  Walls Independent(const Walls& face) const;
   Eigen::VectorXd Slope(int wall, const Eigen::VectorXd& x) const;
 
   std::shared_ptr<Oracle> base_;
@@ -86,15 +88,16 @@ class Clipped : public Oracle {
   std::vector<std::shared_ptr<const Exactness>> exactness_;  // of each wall
   Eigen::MatrixXd seeds_;
   std::vector<std::uint8_t> labels_;
+  std::vector<Walls> closures_;
   double scale_ = 1;  // of where M is: the unit of lengths
 };
 
 // {x in R^d : g(x) >= 0 for all walls g}, as a manifold of dimension d with boundary.
 class Solid final : public Clipped {
  public:
-  // `seeds` and `labels` as Clipped takes them.
+  // `seeds`, `labels` and `closures` as Clipped takes them.
   Solid(std::vector<Wall> walls, BoundingBox around, Eigen::MatrixXd seeds = {},
-        std::vector<std::uint8_t> labels = {});
+        std::vector<std::uint8_t> labels = {}, std::vector<Walls> closures = {});
 };
 
 // A manifold with boundary, from nearest points of it and nearest points of its boundary.
