@@ -208,7 +208,8 @@ void WeightedStars<K>::Build(std::uint32_t p) {
 template <int K>
 bool WeightedStars<K>::BuildForAll(std::uint32_t q, const Choice& choice,
                                    std::vector<Span>* spans) {
-  const auto [p, lower, upper, g] = choice;
+  const std::uint32_t p = choice.point;
+  const double lower = choice.lower, upper = choice.upper, g = choice.g;
   CellMemory<K + 1>& m = Memory<K + 1>();
   std::array<double, K + 1> normal;
   CutByNear(
