@@ -190,6 +190,9 @@ core::Expected<std::unique_ptr<Server>> Server::Start(const Config& config,
   if (!authenticator) return tl::unexpected(std::move(authenticator.error()));
   auto impl = std::make_unique<Impl>(config, std::move(factory));
   impl->state.authenticator = std::move(*authenticator);
+  impl->state.turns->WeighBy([authenticator = impl->state.authenticator](const std::string& owner) {
+    return authenticator->WeightOf(owner);
+  });
   // While this waits for the database.
   if (!config.database.empty()) impl->ListenForPrometheus();
   status = impl->OpenJournal(give_up);

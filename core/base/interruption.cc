@@ -1,5 +1,6 @@
 #include "core/base/interruption.h"
 
+#include "core/base/pauses.h"
 #include "core/base/task_group.h"
 
 #if !defined(__SANITIZE_THREAD__)
@@ -14,7 +15,10 @@ struct Interruption::Group {};
 void Interruption::Raise() { raised_ = true; }
 
 InterruptionCheck::InterruptionCheck() : group_(nullptr) {}
-bool InterruptionCheck::operator()() const { return false; }
+bool InterruptionCheck::operator()() const {
+  PauseIfAsked();
+  return false;
+}
 #else
 void Interruption::Raise() {
   raised_ = true;
@@ -24,6 +28,7 @@ void Interruption::Raise() {
 InterruptionCheck::InterruptionCheck() : group_(tbb::task::current_context()) {}
 
 bool InterruptionCheck::operator()() const {
+  PauseIfAsked();
   if (void (*const told)() = on_interruption_check.load(std::memory_order_relaxed)) told();
   return group_ != nullptr &&
          static_cast<tbb::task_group_context*>(group_)->is_group_execution_cancelled();

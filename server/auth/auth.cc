@@ -117,6 +117,10 @@ bool Authenticator::StillHolds(const Identity& identity) const {
                                 TokenHolder{identity.owner, identity.administrator});
 }
 
+double Authenticator::WeightOf(const std::string& owner) const {
+  return tokens_ == nullptr ? 1 : tokens_->WeightOf(owner);
+}
+
 void Authenticator::Reload(bool force) {
   if (tokens_ != nullptr) tokens_->Reload(force);
 }

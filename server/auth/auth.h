@@ -47,6 +47,9 @@ class Authenticator {
   // False once the token was taken out of the file: for streams, which may outlive it.
   bool StillHolds(const Identity& identity) const;
 
+  // Of processor time, where owners contend for it; 1 where the token file says nothing.
+  double WeightOf(const std::string& owner) const;
+
   bool AsksForTokens() const { return tokens_ != nullptr; }
   // Whether it is of a token that is known; its value is the header's.
   bool Knows(std::string_view authorization) const;

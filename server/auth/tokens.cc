@@ -5,9 +5,11 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <charconv>
 #include <fstream>
 #include <sstream>
 #include <stdexcept>
+#include <system_error>
 #include <utility>
 
 #include "core/base/message.h"
@@ -24,6 +26,9 @@ constexpr std::size_t kMaxOwnerBytes = 64;
 constexpr std::size_t kMinTokenBytes = 16;
 constexpr std::size_t kMaxTokenBytes = 512;
 constexpr std::string_view kAdministrator = "administrator";
+constexpr std::string_view kWeight = "weight=";
+constexpr unsigned kMaxWeight = 1000;
+constexpr std::string_view kBlank = " \t\r";
 constexpr std::size_t kMaxFileBytes = std::size_t{16} << 20;
 
 bool IsOwnerCharacter(unsigned char c) {
@@ -36,6 +41,24 @@ bool IsTokenCharacter(unsigned char c) { return c > ' ' && c < 0x7f; }
 
 tl::unexpected<core::Status> BadLine(std::size_t number, const std::string& rule) {
   return core::Refuse(StatusCode::kInvalidArgument, Message("line ", number, " ", rule));
+}
+
+std::vector<std::string_view> WordsOf(std::string_view line) {
+  std::vector<std::string_view> words;
+  while (!line.empty()) {
+    const std::size_t end = std::min(line.find_first_of(kBlank), line.size());
+    words.push_back(line.substr(0, end));
+    line.remove_prefix(std::min(line.find_first_not_of(kBlank, end), line.size()));
+  }
+  return words;
+}
+
+std::optional<unsigned> ReadWeight(std::string_view text) {
+  unsigned weight = 0;
+  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), weight);
+  const bool is_number = error == std::errc() && end == text.data() + text.size();
+  if (!is_number || weight < 1 || weight > kMaxWeight) return std::nullopt;
+  return weight;
 }
 
 core::Expected<TokenTable> Read(const std::string& path) {
@@ -81,31 +104,43 @@ core::Expected<TokenTable> TokenTable::Parse(std::string_view text) {
     const std::size_t end = std::min(text.find('\n'), text.size());
     std::string_view line = text.substr(0, end);
     text.remove_prefix(std::min(end + 1, text.size()));
-    constexpr std::string_view kBlank = " \t\r";
     line.remove_prefix(std::min(line.find_first_not_of(kBlank), line.size()));
     line = line.substr(0, line.find_last_not_of(kBlank) + 1);
     if (line.empty() || line.front() == '#') continue;
 
-    const std::size_t gap = line.find_first_of(kBlank);
-    if (gap == std::string_view::npos) return BadLine(number, "must be an owner and a token");
-    const std::string_view owner = line.substr(0, gap);
-    std::string_view token = line.substr(line.find_first_not_of(kBlank, gap));
-    const std::size_t word = token.find_last_of(kBlank);
-    const bool administrator =
-        word != std::string_view::npos && token.substr(word + 1) == kAdministrator;
-    if (administrator) token = token.substr(0, token.find_last_not_of(kBlank, word) + 1);
+    auto words = WordsOf(line);
+    if (words.size() < 2) return BadLine(number, "must be an owner and a token");
+    const std::string owner(words[0]);
+    const std::string_view token = words[1];
+    words.erase(words.begin(), words.begin() + 2);
     if (owner.size() > kMaxOwnerBytes || !std::all_of(owner.begin(), owner.end(), IsOwnerCharacter))
       return BadLine(number, Message("must begin with an owner of 1 to ", kMaxOwnerBytes,
                                      " letters, digits, '.', '_', '-' or '@'"));
-    if (token.size() < kMinTokenBytes || token.size() > kMaxTokenBytes ||
+    const auto word = std::find(words.begin(), words.end(), kAdministrator);
+    const bool administrator = word != words.end();
+    if (administrator) words.erase(word);
+    std::optional<unsigned> weight;
+    if (words.size() == 1 && words[0].starts_with(kWeight)) {
+      weight = ReadWeight(words[0].substr(kWeight.size()));
+      if (!weight) {
+        return BadLine(
+            number, Message("must have behind \"weight=\" a whole number from 1 to ", kMaxWeight));
+      }
+      words.clear();
+    }
+    if (!words.empty() || token.size() < kMinTokenBytes || token.size() > kMaxTokenBytes ||
         !std::all_of(token.begin(), token.end(), IsTokenCharacter)) {
       return BadLine(number,
                      Message("must end with a token of ", kMinTokenBytes, " to ", kMaxTokenBytes,
                              " visible ASCII characters without blanks, or "
                              "with such a one and the word ",
-                             kAdministrator));
+                             kAdministrator, ", ", kWeight, "N, or both"));
     }
-    Entry entry{Digest(token), {std::string(owner), administrator}};
+    if (weight && !table.weights_.emplace(owner, *weight).second &&
+        table.weights_.at(owner) != *weight) {
+      return BadLine(number, "gives its owner another weight than an earlier line");
+    }
+    Entry entry{Digest(token), {owner, administrator}};
     if (table.HolderOf(entry.digest)) return BadLine(number, "repeats the token of another line");
     table.entries_.push_back(std::move(entry));
   }
@@ -125,6 +160,11 @@ std::optional<TokenHolder> TokenTable::HolderOf(const TokenDigest& digest) const
   return found->holder;
 }
 
+unsigned TokenTable::WeightOf(const std::string& owner) const {
+  const auto it = weights_.find(owner);
+  return it == weights_.end() ? 1 : it->second;
+}
+
 core::Expected<std::unique_ptr<TokenFile>> TokenFile::Open(const std::string& path) {
   std::unique_ptr<TokenFile> file(new TokenFile(path));
   file->stamp_ = FileStamp(path);  // before reading: a change in between is found by Reload
@@ -138,14 +178,16 @@ core::Expected<std::unique_ptr<TokenFile>> TokenFile::Open(const std::string& pa
   return file;
 }
 
-std::optional<TokenHolder> TokenFile::HolderOf(const TokenDigest& digest) const {
-  std::shared_ptr<const TokenTable> table;
-  {
-    const std::lock_guard lock(mutex_);
-    table = table_;
-  }
-  return table->HolderOf(digest);
+std::shared_ptr<const TokenTable> TokenFile::Table() const {
+  const std::lock_guard lock(mutex_);
+  return table_;
 }
+
+std::optional<TokenHolder> TokenFile::HolderOf(const TokenDigest& digest) const {
+  return Table()->HolderOf(digest);
+}
+
+unsigned TokenFile::WeightOf(const std::string& owner) const { return Table()->WeightOf(owner); }
 
 void TokenFile::Reload(bool force) {
   std::string stamp = FileStamp(path_);

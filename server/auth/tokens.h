@@ -1,6 +1,7 @@
 #pragma once
 
 #include <array>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -25,13 +26,16 @@ struct TokenHolder {
 // that neither a log nor a core dump gives one away.
 class TokenTable {
  public:
-  // Lines "owner token" or "owner token administrator"; blank lines and lines that start with '#'
-  // are skipped. An owner may have several tokens. kInvalidArgument names the line, never what it
+  // Lines "owner token", with the word "administrator" or a weight, "weight=4", or both behind;
+  // blank lines and lines that start with '#' are skipped. An owner may have several tokens, and
+  // has one weight, which one of the lines says. kInvalidArgument names the line, never what it
   // holds.
   static core::Expected<TokenTable> Parse(std::string_view text);
 
   // Looks at every entry, whatever it finds: the time taken says nothing about the tokens.
   std::optional<TokenHolder> HolderOf(const TokenDigest& digest) const;
+  // 1 where no line says another.
+  unsigned WeightOf(const std::string& owner) const;
   std::size_t size() const { return entries_.size(); }
 
  private:
@@ -40,6 +44,7 @@ class TokenTable {
     TokenHolder holder;
   };
   std::vector<Entry> entries_;
+  std::map<std::string, unsigned> weights_;
 };
 
 TokenDigest Digest(std::string_view token);
@@ -50,12 +55,15 @@ class TokenFile {
   static core::Expected<std::unique_ptr<TokenFile>> Open(const std::string& path);
 
   std::optional<TokenHolder> HolderOf(const TokenDigest& digest) const;
+  unsigned WeightOf(const std::string& owner) const;
   // Reads the file again if it is another than before, or in any case where `force`. One that
   // cannot be read, or is wrong, changes nothing and is logged once.
   void Reload(bool force = false);
 
  private:
   explicit TokenFile(std::string path) : path_(std::move(path)) {}
+
+  std::shared_ptr<const TokenTable> Table() const;
 
   const std::string path_;
   mutable std::mutex mutex_;

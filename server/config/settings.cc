@@ -100,7 +100,9 @@ const std::vector<Setting>& Settings() {
        "the client's meshes, unless there is a --token-file"},
       {kSafety, "--token-file", &Config::token_file,
        "File of lines \"OWNER TOKEN\": clients must send one of these tokens, and see their "
-       "owner's meshes alone. Read again when it changes, or after SIGHUP"},
+       "owner's meshes alone. With \"weight=N\" behind, N from 1 to 1000, an owner has N times the "
+       "processor time of one without, where they contend for it. Read again when it changes, or "
+       "after SIGHUP"},
 
       {kServerLimits, "--max-meshes", &Config::max_meshes,
        "Meshes running at a time; of several servers on a --database each its own", 1, 100'000,

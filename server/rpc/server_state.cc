@@ -1,6 +1,7 @@
 #include "server/rpc/server_state.h"
 
 #include <chrono>
+#include <thread>
 #include <utility>
 
 namespace stellate::server {
@@ -24,6 +25,7 @@ ServerState::ServerState(const Config& config, Session::MesherFactory factory)
       memory(std::make_shared<MemoryBudget>(ToMemoryLimits(config))),
       stream_memory(
           std::make_shared<MemoryBudget>(ToMemoryLimits(config), MemoryBudget::Of::kStreams)),
+      turns(std::make_shared<Turns>(std::thread::hardware_concurrency())),
       store(ToStoreLimits(config), std::move(factory)) {
   memory->MakeRoomBy([this] { return store.UnloadHistories(); });
 }
@@ -48,6 +50,7 @@ void ApplyServerPolicy(ServerState& state, SessionOptions* options) {
   options->policy.max_workers = config.max_workers;
   options->policy.max_watchers = config.max_watchers;
   options->ports.observer = state.metrics.observer();
+  options->ports.turns = state.turns;
   options->ports.memory = MemoryBudget::Open(state.memory, options->request.owner);
 }
 

@@ -51,6 +51,7 @@ struct ServerState {
 
   SettingsInForce settings;
   const std::shared_ptr<MemoryBudget> memory, stream_memory;
+  const std::shared_ptr<Turns> turns;
   StreamRegistry streams;
   std::unique_ptr<Journal> journal;  // null: meshes live in memory alone
   SessionStore store;

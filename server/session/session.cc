@@ -113,6 +113,7 @@ void Session::Run() {
     auto made = Begin(request(), factory_, intake_.get());
     if (made) {
       mesher = std::move(*made);
+      if (ports().turns) mesher = InTurns(std::move(mesher), ports().turns, request().owner);
       SetInterruptible(mesher.get());
       RunRounds(mesher.get());
       report = mesher->report();

@@ -91,9 +91,11 @@ SERVER = {
     "server/history": (*FACE, "server/base"),
     "server/oracles": (*FACE, "server/base"),
     "server/points": (*FACE, "server/base", "server/history"),
+    "server/turns": (*FACE, "server/base"),
     "server/session": (
         *FACE,
         "server/base",
+        "server/turns",
         "server/points",
         "server/memory",
         "server/history",

@@ -13,6 +13,7 @@
 
 #include "core/base/arenas.h"
 #include "core/base/parallel_sort.h"
+#include "core/base/pauses.h"
 #include "core/base/random.h"
 
 namespace stellate::core {
@@ -84,6 +85,24 @@ TEST(Parallel, ALongLoopLooksUpNowAndThen) {
     }
   }));
   EXPECT_EQ(step, 8192u);
+}
+
+TEST(Parallel, ChecksPauseTheThreadThatAsksForIt) {
+  Interruption interruption;
+  int pauses = 0;
+  const auto pause = [&pauses] { ++pauses; };
+  {
+    const Pauses asked(pause);
+    EXPECT_TRUE(WithThreads(1, interruption, [] { ParallelFor(1000, [](int) {}); }));
+    EXPECT_GE(pauses, 1000);
+    std::thread other([] { ThrowIfInterrupted(); });
+    const int before = pauses;
+    other.join();
+    EXPECT_EQ(pauses, before);
+  }
+  const int before = pauses;
+  ThrowIfInterrupted();
+  EXPECT_EQ(pauses, before);
 }
 
 // One given up would stay in memory for as long as others have work.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import concurrent.futures
 import pathlib
 import re
 import signal
@@ -80,3 +81,41 @@ def test_the_page_lists_what_can_change():
     config = subprocess.run([program, "--print-config"], capture_output=True, text=True).stdout
     live = re.findall(r"(?m)^# .*\. SIGHUP reads it again\n([\w-]+) = ", config)
     assert live and sorted(re.findall(r"`([\w-]+)`[,\n]", section)) == sorted(live)
+
+
+def test_weights_are_read_refused_and_read_again(tmp_path):
+    tokens = {"ada": "ada-0123456789abcdef", "ben": "ben-0123456789abcdef"}
+    file = tmp_path / "tokens"
+
+    def weigh(ada):
+        file.write_text(f"ada {tokens['ada']} weight={ada}\nben {tokens['ben']}\n")
+        file.chmod(0o600)
+
+    program = stellate.server.find_stellated()
+    command = [program, "--listen", f"unix:{tmp_path}/s", "--token-file", str(file)]
+    for wrong in ("0", "-3", "nan", "1e9", ""):
+        weigh(wrong)
+        done = subprocess.run(command, capture_output=True, text=True)
+        assert done.returncode == 2
+        assert "line 1 must have behind" in done.stderr and tokens["ada"] not in done.stderr
+    weigh(3)
+    with subprocess.Popen(
+        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        address = process.stdout.readline().split()[-1]
+        alone = stellate.mesh(stellate.manifolds.Torus(), epsilon=0.3)
+
+        def mesh(owner):
+            with stellate.Client(address, stellate.Credentials(token=tokens[owner])) as client:
+                return stellate.mesh(stellate.manifolds.Torus(), epsilon=0.3, server=client)
+
+        weigh("0")
+        assert "the tokens read before stay in force" in told(process, "weight=")
+        weigh(1000)
+        told(process, "2 tokens")
+        with concurrent.futures.ThreadPoolExecutor() as pool:
+            for made in pool.map(mesh, ["ada", "ben", "ada", "ben", "ben"]):
+                assert (made.points == alone.points).all()
+                assert (made.simplices == alone.simplices).all()
+        process.terminate()
+        process.stderr.read()

@@ -40,6 +40,36 @@ TEST(TokenTable, AThirdWordMakesAnAdministrator) {
     EXPECT_FALSE(TokenTable::Parse(std::string("alice ") + kAlice + " " + word)) << word;
 }
 
+TEST(TokenTable, AnOwnerHasAWeight) {
+  const auto table = TokenTable::Parse(
+      std::string("alice ") + kAlice + " weight=4\n" + Line("alice", "second-0123456789") + "bob " +
+      kBob + " administrator weight=1000\n" + "cleo third-0123456789abcd weight=2 administrator\n" +
+      Line("dan", "fourth-0123456789abc"));
+  ASSERT_TRUE(table) << table.error().message;
+  EXPECT_EQ(table->WeightOf("alice"), 4u);
+  EXPECT_EQ(table->WeightOf("bob"), 1000u);
+  EXPECT_EQ(table->HolderOf(Digest(kBob)), (TokenHolder{"bob", true}));
+  EXPECT_EQ(table->WeightOf("cleo"), 2u);
+  EXPECT_EQ(table->WeightOf("dan"), 1u);
+  EXPECT_EQ(table->WeightOf("nobody"), 1u);
+}
+
+TEST(TokenTable, RefusesWeightsThatAreNone) {
+  for (const char* weight :
+       {"0", "-1", "nan", "inf", "1001", "99999999999999999999", "1.5", "", "+1", "4x", "1e2"}) {
+    const auto table =
+        TokenTable::Parse(Line("bob", kBob) + "alice " + kAlice + " weight=" + weight);
+    ASSERT_FALSE(table) << weight;
+    EXPECT_EQ(table.error().message,
+              "line 2 must have behind \"weight=\" a whole number from 1 to 1000");
+  }
+  const std::string first = std::string("alice ") + kAlice + " weight=4\n";
+  EXPECT_FALSE(TokenTable::Parse(first + "alice second-0123456789 weight=5"));
+  EXPECT_TRUE(TokenTable::Parse(first + "alice second-0123456789 weight=4"));
+  EXPECT_FALSE(TokenTable::Parse(std::string("alice ") + kAlice + " weight=4 weight=4"));
+  EXPECT_FALSE(TokenTable::Parse(std::string("alice ") + kAlice + " weight 4"));
+}
+
 TEST(TokenTable, RefusesBadLinesAndNeverQuotesThem) {
   for (const std::string& line :
        {std::string("alice"), std::string("secret0123456789secret0123456789"),
@@ -68,6 +98,13 @@ TEST(TokenFile, IsReadAgainWhenItChanges) {
   (*file)->Reload();
   EXPECT_EQ((*file)->HolderOf(Digest(kAlice)), std::nullopt);
   EXPECT_EQ((*file)->HolderOf(Digest(kBob)), TokenHolder{"bob"});
+  EXPECT_EQ((*file)->WeightOf("bob"), 1u);
+  WriteFile(path, std::string("bob ") + kBob + " weight=7\n");
+  (*file)->Reload();
+  EXPECT_EQ((*file)->WeightOf("bob"), 7u);
+  WriteFile(path, std::string("bob ") + kBob + " weight=0\n");
+  (*file)->Reload();
+  EXPECT_EQ((*file)->WeightOf("bob"), 7u);
 }
 
 TEST(TokenFile, ABadOrMissingFileLeavesTheTokensInForce) {
