@@ -218,8 +218,8 @@ struct Certificate {
   std::vector<RegionReport> regions;  // of an arrangement of walls, by label; else none
   // Of an arrangement: the vertices at which M, or a region, touches itself in an edge or a point.
   std::uint64_t pinched_vertices = 0;
-  // Of all of M, length^k, or of a boundary alone what it encloses; 0: see RegionReport. Regions
-  // add up to it. Set with walls alone.
+  // Of all simplices, length^k, or of a boundary alone what it encloses; 0: see RegionReport. The
+  // regions add up to it.
   double volume = 0;
   // The smallest angle of walls at all vertices on several walls; none: no walls meet. Set for
   // every ending of a run.

@@ -303,7 +303,8 @@ void ToProto(const Session& session, v1::Mesh* out) {
       report->mutable_failure()->set_reason(FailureReasonName(view.failure.reason));
       report->mutable_failure()->set_message(Cut(view.failure.message, kMaxFailureBytes));
     }
-    report->set_text(ReportText(*report, request.region_names));
+    // Of a boundary alone it is measured what it encloses.
+    report->set_text(ReportText(*report, request.spec.dimension, request.region_names));
   }
   out->set_workers(static_cast<std::uint32_t>(view.workers));
   out->set_watchers(static_cast<std::uint32_t>(view.watchers));

@@ -128,6 +128,18 @@ void AddTopology(const v1::Certificate& c, bool of_points, Entries* entries) {
   entries->Add("stars", stars);
 }
 
+// Simplices are chords: what they measure is off by a share of about (epsilon / reach)^2.
+void AddSize(const v1::Certificate& c, int k, Entries* entries) {
+  if (!(c.volume() > 0)) return;
+  constexpr const char* kNames[] = {"", "length", "area", "volume"};
+  std::string words =
+      Message(k <= 3 ? kNames[k] : std::to_string(k) + "-volume", " ", Digits(c.volume(), 6));
+  const double share = c.epsilon_over_reach() * c.epsilon_over_reach();
+  if (c.certified() && share > 0)
+    words += Message(", off by O(epsilon^2): a share of about ", Digits(share, 1));
+  entries->Add("measure", words);
+}
+
 void AddMeasures(const v1::Certificate& c, bool of_points, Entries* entries) {
   std::string shape =
       Message("largest circumradius ", Digits(c.max_circumradius(), 4), ", radius-edge ratio ",
@@ -238,7 +250,7 @@ void AddRegions(const v1::Certificate& c, const std::vector<std::string>& names,
 
 }  // namespace
 
-std::string ReportText(const v1::Report& report, const std::vector<std::string>& names) {
+std::string ReportText(const v1::Report& report, int k, const std::vector<std::string>& names) {
   const v1::Counts& n = report.counts();
   const v1::Certificate& c = report.certificate();
   Entries entries;
@@ -261,6 +273,7 @@ std::string ReportText(const v1::Report& report, const std::vector<std::string>&
   entries.Add("certificate", Judgement(c));
   if (c.components() > 0) {
     AddTopology(c, report.has_reconstruction(), &entries);
+    AddSize(c, k, &entries);
     AddMeasures(c, report.has_reconstruction(), &entries);
     AddRegions(c, names, &entries);
     if (c.has_protection()) AddProtection(c.protection(), &entries);

@@ -11,6 +11,8 @@ namespace stellate::server {
 // in 13 columns, lines of at most 100 bytes (unless a word is longer), folded under their words.
 // UTF-8 without control characters but '\n', whatever workers and oracles said. `report.text` is
 // ignored.
-std::string ReportText(const v1::Report& report, const std::vector<std::string>& names = {});
+//
+// `k`: of the simplices. `names`: of the regions.
+std::string ReportText(const v1::Report& report, int k, const std::vector<std::string>& names = {});
 
 }  // namespace stellate::server

@@ -252,7 +252,7 @@ class Certificate:
     sharpest: WallAngle | None = None  # where walls meet at the smallest angle, if any meet
     regions: tuple[RegionCertificate, ...] = ()  # of an arrangement of walls, by label
     pinched_vertices: int = 0  # where a region touches itself in an edge or a point alone
-    # With walls, of all of M, to which regions add up; of the boundary alone what it encloses.
+    # Of all simplices, to which regions add up; of the boundary alone what it encloses.
     volume: float = 0.0
     only_too_coarse: bool = False  # refused for its size alone: nothing seen contradicts it
     protection: Protection | None = None  # where `protection` was asked for

@@ -75,9 +75,8 @@ void BoundaryClaims::JudgeFaces(const ClosedOff& closed) {
 }
 
 void BoundaryClaims::JudgeVolume() {
-  Certificate& c = x_.certificate;
+  const Certificate& c = x_.certificate;
   const auto k = static_cast<std::size_t>(x_.mesh.k);
-  c.volume = MeasureVolume(x_.mesh, x_.mesh.k, *x_.mesh.simplices);
   if (x_.mesh.d != x_.mesh.k) return;
   using Facet = std::array<std::uint32_t, kMaxDimension>;
   std::vector<Facet> ends;

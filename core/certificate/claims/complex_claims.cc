@@ -14,6 +14,7 @@
 #include "core/certificate/claims/boundary_claims.h"
 #include "core/certificate/complex/closed_betti.h"
 #include "core/certificate/complex/links.h"
+#include "core/certificate/measure/together.h"
 
 namespace stellate::core {
 namespace {
@@ -224,8 +225,9 @@ std::optional<StarGeometry> JudgeComplex(Examination& x) {
   JudgeStars(x, stars);
   x.shape = std::move(stars.shape);
   JudgeSize(x);
-  if (closed) BoundaryClaims(x).JudgeVolume();
   Certificate& c = x.certificate;
+  c.volume = MeasureVolume(x.mesh, x.mesh.k, *x.mesh.simplices);
+  if (closed) BoundaryClaims(x).JudgeVolume();
   if (!closed && c.closed && c.links_are_spheres)
     c.betti = ClosedBettiNumbers(x.list(), static_cast<std::int64_t>(c.components),
                                  c.euler_characteristic);

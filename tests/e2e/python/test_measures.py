@@ -1,5 +1,7 @@
 """What is measured on meshes, beside closed forms; errors fall with epsilon squared."""
 
+import re
+
 import numpy as np
 import pytest
 import stellate
@@ -78,6 +80,33 @@ def test_a_curve(server):
     assert ((mesh.normals() * mesh.points[mesh.simplices].mean(axis=1)).sum(axis=1) > 0).all()
     with pytest.raises(stellate.InvalidArgument, match="has a volume, and no area"):
         mesh.area  # noqa: B018
+
+
+@pytest.mark.parametrize(
+    "oracle, epsilon, name, exact, options",
+    [
+        (manifolds.Sphere(1), 0.2, "length", 2 * PI, {}),
+        (manifolds.Torus(), 0.1, "area", 4 * PI**2 * 0.4, {}),
+        (manifolds.SpecialOrthogonal3(), 0.5, "volume", 8 * PI**2 * 2**1.5, {}),
+        (s.Ball(), 0.3, "volume", 4 / 3 * PI, {}),
+        (s.Ball(), 0.3, "volume", 4 / 3 * PI, {"boundary_only": True}),  # which that encloses
+    ],
+)
+def test_the_report_measures_and_says_how_far_that_is_off(
+    server, oracle, epsilon, name, exact, options
+):
+    mesh = stellate.mesh(oracle, epsilon, server=server, **options)
+    assert mesh.certified
+    said = re.fullmatch(
+        rf"{name} (\S+), off by O\(epsilon\^2\): a share of about (\S+)",
+        dict(mesh.report.lines())["measure"],
+    )
+    size, share = map(float, said.groups())
+    assert size == pytest.approx(mesh.report.certificate.volume, rel=1e-5)
+    own = mesh.enclosed_volume if options else mesh.volume
+    assert size == pytest.approx(own, rel=1e-5)
+    assert share == pytest.approx(mesh.report.certificate.epsilon_over_reach**2, rel=0.5)
+    assert exact * (1 - share) < size < exact
 
 
 def test_a_ball_and_a_shell(server):

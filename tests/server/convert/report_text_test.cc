@@ -39,7 +39,7 @@ bool Says(const std::string& text, const std::string& words) {
 }
 
 TEST(ReportText, IsAsAllClientsShowIt) {
-  EXPECT_EQ(ReportText(Good()), R"(         mesh  1,234,567 vertices, 42 simplices
+  EXPECT_EQ(ReportText(Good(), 2), R"(         mesh  1,234,567 vertices, 42 simplices
           run  converged: no refinement rule applies any more
          took  0.50 s, 0 round trips, 1,000 queries
  inserted for  size 0, radius-edge 0, slivers 0, inconsistencies 0
@@ -58,8 +58,21 @@ TEST(ReportText, IsAsAllClientsShowIt) {
 TEST(ReportText, NamesBettiNumbersWhereTheyAreKnown) {
   v1::Report report = Good();
   for (const std::int64_t number : {1, 10, 1}) report.mutable_certificate()->add_betti(number);
-  EXPECT_TRUE(Says(ReportText(report), "not orientable, Betti numbers 1 10 1\n"))
-      << ReportText(report);
+  EXPECT_TRUE(Says(ReportText(report, 2), "not orientable, Betti numbers 1 10 1\n"))
+      << ReportText(report, 2);
+}
+
+TEST(ReportText, MeasuresAndSaysHowFarThatIsOff) {
+  v1::Report report = Good();
+  v1::Certificate& c = *report.mutable_certificate();
+  c.set_volume(12.37);
+  EXPECT_TRUE(Says(ReportText(report, 2), "      measure  area 12.37\n"));
+  c.set_epsilon_over_reach(0.2);
+  EXPECT_TRUE(
+      Says(ReportText(report, 2), "area 12.37, off by O(epsilon^2): a share of about 0.04\n"));
+  EXPECT_TRUE(Says(ReportText(report, 4), "4-volume 12.37, off"));
+  c.set_certified(false);  // the reach is then no more than a bound
+  EXPECT_TRUE(Says(ReportText(report, 1), "length 12.37\n"));
 }
 
 TEST(ReportText, SaysOfPointsWhatWasMeasuredAlone) {
@@ -67,7 +80,7 @@ TEST(ReportText, SaysOfPointsWhatWasMeasuredAlone) {
   report.mutable_reconstruction()->set_spacing(0.5);
   report.mutable_certificate()->set_fibre_samples(0);
   report.mutable_certificate()->set_epsilon_over_reach(0.25);
-  const std::string text = ReportText(report);
+  const std::string text = ReportText(report, 2);
   EXPECT_TRUE(Says(text, "0 stars overlap\n")) << text;
   EXPECT_FALSE(Says(text, "normal flats")) << text;
   EXPECT_FALSE(Says(text, "barycentres")) << text;
@@ -78,7 +91,7 @@ TEST(ReportText, SaysThatAManifoldEnds) {
   v1::Report report = Good();
   report.mutable_certificate()->add_faces()->add_walls(0);
   EXPECT_TRUE(
-      Says(ReportText(report), "closed up to its boundary; every link a sphere or a ball "));
+      Says(ReportText(report, 2), "closed up to its boundary; every link a sphere or a ball "));
 }
 
 TEST(ReportText, NamesRegionsAndTellsWhereTheyTouchThemselves) {
@@ -94,7 +107,7 @@ TEST(ReportText, NamesRegionsAndTellsWhereTheyTouchThemselves) {
   face->set_label_below(1);
   face->set_label_above(2);
   report.mutable_certificate()->set_pinched_vertices(12);
-  const std::string text = ReportText(report, {"", "grain"});
+  const std::string text = ReportText(report, 2, {"", "grain"});
   EXPECT_TRUE(Says(text, "region  label 1: 1,000 simplices, volume 0.5"));
   EXPECT_TRUE(Says(text, "region  label 2 (grain): 2,000 simplices, volume 0.5"));
   EXPECT_TRUE(Says(text, "interface  wall 6, between 1 and 2 (grain): "));
@@ -108,26 +121,26 @@ TEST(ReportText, SaysWhetherItIsCertified) {
   c.set_verdict("Proved: by a theorem.");
   c.set_declared_reach(0.5);
   c.set_proved_distance(0.01);
-  EXPECT_TRUE(Says(ReportText(report), "certificate  PROVED: by a theorem."));
-  EXPECT_TRUE(Says(ReportText(report), "a reach of 0.5: within 0.01 of the manifold, proved"));
+  EXPECT_TRUE(Says(ReportText(report, 2), "certificate  PROVED: by a theorem."));
+  EXPECT_TRUE(Says(ReportText(report, 2), "a reach of 0.5: within 0.01 of the manifold, proved"));
   c.set_certified(false);
   c.set_level(v1::CERTIFICATE_LEVEL_REFUSED);
   c.set_reach_refuted(true);
   c.set_verdict("Not certified: 3 links.");
   c.add_warnings("epsilon is coarse");
-  const std::string bad = ReportText(report);
+  const std::string bad = ReportText(report, 2);
   EXPECT_TRUE(Says(bad, "certificate  NOT CERTIFIED: 3 links.\n")) << bad;
   EXPECT_TRUE(Says(bad, "a reach of 0.5, refuted\n")) << bad;
   EXPECT_TRUE(Says(bad, "at most inf, epsilon is 0 of it or more\n")) << bad;
   EXPECT_TRUE(bad.ends_with("      warning  epsilon is coarse\n")) << bad;
   c.set_verdict("");
-  EXPECT_TRUE(Says(ReportText(report), "certificate  NOT CERTIFIED\n"));
+  EXPECT_TRUE(Says(ReportText(report, 2), "certificate  NOT CERTIFIED\n"));
 }
 
 TEST(ReportText, LeavesOutTheTopologyOfNothing) {
   v1::Report report = Good();
   report.mutable_certificate()->set_components(0);
-  EXPECT_FALSE(Says(ReportText(report), "topology"));
+  EXPECT_FALSE(Says(ReportText(report, 2), "topology"));
 }
 
 TEST(ReportText, FoldsLongLinesUnderTheirWords) {
@@ -135,7 +148,7 @@ TEST(ReportText, FoldsLongLinesUnderTheirWords) {
   std::string verdict, long_word(120, 'x');
   for (int i = 0; i < 60; ++i) verdict += "word ";
   report.mutable_certificate()->set_verdict(verdict + long_word + " end");
-  std::istringstream lines(ReportText(report));
+  std::istringstream lines(ReportText(report, 2));
   int folded = 0;
   for (std::string line; std::getline(lines, line);) {
     if (Says(line, long_word)) {
@@ -150,7 +163,7 @@ TEST(ReportText, FoldsLongLinesUnderTheirWords) {
 
 TEST(ReportText, SaysHowWellAMeshIsProtected) {
   v1::Report report = Good();
-  EXPECT_FALSE(Says(ReportText(report), "protection"));
+  EXPECT_FALSE(Says(ReportText(report, 2), "protection"));
   report.mutable_counts()->set_inserted_protection(7);
   v1::Protection& p = *report.mutable_certificate()->mutable_protection();
   p.set_asked(0.01);
@@ -159,14 +172,14 @@ TEST(ReportText, SaysHowWellAMeshIsProtected) {
   p.set_median(0.06);
   p.set_stability_radius(0.0005);
   p.set_thickness_bound(0.009);
-  std::string text = ReportText(report);
+  std::string text = ReportText(report, 2);
   EXPECT_TRUE(Says(text, ", protection 7")) << text;
   EXPECT_TRUE(Says(text, "protection  0.01 asked, reached: gaps from 0.0101")) << text;
   EXPECT_TRUE(Says(text, "vertices move by less than 0.0005")) << text;
   EXPECT_FALSE(Says(text, "intrinsic")) << text;
   p.set_is_delaunay(true);
   p.set_weak(1);
-  text = ReportText(report);
+  text = ReportText(report, 2);
   EXPECT_TRUE(Says(text, "not reached by 1 simplex:")) << text;
   EXPECT_TRUE(Says(text, "intrinsic, restricted and tangential")) << text;
 }
@@ -179,7 +192,7 @@ TEST(ReportText, ShowsNoCommandOfStrangers) {
   report.mutable_failure()->set_message("line 1\n  certificate  CERTIFIED\x1b[2J\r\u202e");
   report.mutable_certificate()->set_verdict("\x1b]0;title\x07");
   report.mutable_certificate()->add_warnings("one\ntwo\xff");
-  const std::string text = ReportText(report);
+  const std::string text = ReportText(report, 2);
   EXPECT_TRUE(Says(text,
                    "      failure  ORACLE_FAILED: line 1\n"
                    "                 certificate  CERTIFIED?[2J??\n"))
@@ -194,7 +207,7 @@ TEST(ReportText, NamesEveryTermination) {
   for (int i = 1; i < v1::Termination_ARRAYSIZE; ++i) {
     v1::Report report;
     report.set_termination(static_cast<v1::Termination>(i));
-    EXPECT_FALSE(Says(ReportText(report), "unknown")) << i;
+    EXPECT_FALSE(Says(ReportText(report, 2), "unknown")) << i;
   }
 }
 

@@ -170,7 +170,7 @@ struct Certificate {
   std::optional<WallAngle> sharpest;       // where walls meet at the smallest angle, if any meet
   std::vector<RegionCertificate> regions;  // of an arrangement of walls, by label
   std::uint64_t pinched_vertices = 0;      // where a region touches itself in an edge or a point
-  // With walls, of all of M, to which regions add up; of the boundary alone what it encloses.
+  // Of all simplices, to which regions add up; of the boundary alone what it encloses.
   double volume = 0;
 
   // Refused for epsilon alone: no check contradicts the mesh, which is too coarse, compared with
