@@ -21,6 +21,7 @@ class ClosestPointOnly final : public Oracle {
   int ambient_dimension() const override { return oracle_.ambient_dimension(); }
   Answer ClosestPoint(const Eigen::MatrixXd& x) override { return oracle_.ClosestPoint(x); }
   std::optional<BoundingBox> bounding_box() const override { return oracle_.bounding_box(); }
+  Eigen::VectorXd coordinate_scale() const override { return oracle_.coordinate_scale(); }
 
  private:
   Oracle& oracle_;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "stellate/catalogue.h"
+#include "stellate/oracles/combined.h"
 #include "stellate/oracles/walls.h"
 #include "stellate/solids.h"
 
@@ -143,6 +144,13 @@ OracleSource::OracleSource(CLI::App* command) {
       ->allow_extra_args(false)
       ->excludes(solid)
       ->excludes(material);
+  command
+      ->add_option("--scale", scale_,
+                   "where axes have different units: how far the manifold goes along each, "
+                   ".01,500,1; --epsilon and all other lengths are of x / scale, the mesh is in x: "
+                   "docs/fields/scaling.md")
+      ->type_name("S1,S2,...")
+      ->delimiter(',');
   CLI::App* const group = command->add_option_group(
       "Oracle command",
       "a program in any language that answers batches of queries: docs/using/pipe.md");
@@ -185,8 +193,15 @@ Expected<void> OracleSource::ReadWhereabouts() {
 
 Expected<std::unique_ptr<Oracle>> OracleSource::Make(std::stop_token stop) {
   auto made = MakeUnclipped(std::move(stop));
-  if (!made) return made;
-  return Clip(std::move(*made), clips_);
+  if (made) made = Clip(std::move(*made), clips_);
+  if (!made || scale_.empty()) return made;
+  const auto axes = static_cast<Eigen::Index>(scale_.size());
+  try {
+    return std::make_unique<oracles::InUnits>(
+        std::move(*made), Eigen::Map<const Eigen::VectorXd>(scale_.data(), axes));
+  } catch (const std::invalid_argument& refusal) {
+    return Fail(ErrorCode::kRefused, std::string("--scale: ") + refusal.what());
+  }
 }
 
 std::string OracleSource::name() const {

@@ -33,6 +33,7 @@ class OracleSource {
 
   std::string manifold_, solid_, box_;
   std::vector<std::string> seeds_, clips_, materials_;
+  std::vector<double> scale_;
   CommandOptions command_;
 };
 

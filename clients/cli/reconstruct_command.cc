@@ -50,6 +50,11 @@ ReconstructCommand::ReconstructCommand(CLI::App& parent)
   command_->add_flag(
       "--steiner", options_.steiner,
       "vertices may be added, after the points, where nothing else makes stars agree");
+  command_
+      ->add_option("--scale", options_.scale,
+                   "where axes have different units: how far the manifold goes along each, "
+                   ".01,500,1; noise, reach and the report are of points / scale")
+      ->delimiter(',');
   server_.AddReconnect(command_);
   report_.AddTo(command_);
   command_->footer(

@@ -8,6 +8,7 @@
 #include "server/convert/error_map.h"
 #include "server/convert/points.h"
 #include "server/convert/report_text.h"
+#include "server/convert/scale.h"
 #include "server/convert/spec.h"
 
 namespace stellate::server {
@@ -275,6 +276,7 @@ void ToProto(const Session& session, v1::Mesh* out) {
     out->mutable_spec()->mutable_oracle()->set_about(request.about);
     out->mutable_spec()->mutable_region_names()->Add(request.region_names.begin(),
                                                      request.region_names.end());
+    out->mutable_spec()->mutable_scale()->Add(request.scale.begin(), request.scale.end());
   }
   out->mutable_spec()->set_label(request.label);
   if (request.points) ToProto(*request.points, out->mutable_spec());
@@ -291,8 +293,8 @@ void ToProto(const Session& session, v1::Mesh* out) {
   if (view.report) {
     v1::Report* const report = out->mutable_report();
     ToProto(*view.report, request.spec.simplex_dimension(), report);
-    report->mutable_certificate()->set_verdict(
-        VerdictOf(request, view.report->certificate.verdict));
+    ToOwnCoordinates(request.scale, report->mutable_certificate());
+    report->mutable_certificate()->set_verdict(VerdictOf(request, report->certificate().verdict()));
     report->set_elapsed_seconds(view.elapsed_seconds);
     if (const auto finer = core::ChooseFinerEpsilon(*view.report, request.spec.epsilon)) {
       report->mutable_finer()->set_epsilon(finer->epsilon);
@@ -301,7 +303,11 @@ void ToProto(const Session& session, v1::Mesh* out) {
     if (view.state == SessionState::kFailed) {
       report->set_termination(v1::TERMINATION_ORACLE_FAILED);
       report->mutable_failure()->set_reason(FailureReasonName(view.failure.reason));
-      report->mutable_failure()->set_message(Cut(view.failure.message, kMaxFailureBytes));
+      std::string message = view.failure.message;
+      // An oracle's own words are its client's, who knows in which coordinates it spoke.
+      if (view.failure.reason != FailureReason::kOracleFailed)
+        message = InOwnCoordinates(request.scale, message);
+      report->mutable_failure()->set_message(Cut(message, kMaxFailureBytes));
     }
     // Of a boundary alone it is measured what it encloses.
     report->set_text(ReportText(*report, request.spec.dimension, request.region_names));

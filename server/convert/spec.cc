@@ -1,6 +1,7 @@
 #include "server/convert/spec.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <limits>
 
@@ -277,6 +278,19 @@ Refused ReadRegionNames(const v1::MeshSpec& spec, std::vector<std::string>* name
   return Status::Ok();
 }
 
+Refused ReadScale(const v1::MeshSpec& spec, Eigen::VectorXd* scale) {
+  const int given = spec.scale_size();
+  if (given != 0 && static_cast<std::uint32_t>(given) != spec.ambient_dimension())
+    return Invalid("scale", Message("scale has ", given, " numbers but must have ",
+                                    spec.ambient_dimension(), ", one for each axis, or none"));
+  for (const double unit : spec.scale()) {
+    if (!std::isfinite(unit) || !(unit > 0))
+      return Invalid("scale", Message("scale has ", unit, " but its numbers must be above 0"));
+  }
+  *scale = Eigen::Map<const Eigen::VectorXd>(spec.scale().data(), given);
+  return Status::Ok();
+}
+
 }  // namespace
 
 Refused ReadCommon(const v1::Reconstruction& spec, const Config& config, MeshRequest* out) {
@@ -318,6 +332,7 @@ Allowed<MeshRequest> ReadSpec(const v1::MeshSpec& spec, const Config& config) {
   }
   if (status.ok()) status = CheckAbout(request.about);
   if (status.ok()) status = ReadRegionNames(spec, &request.region_names);
+  if (status.ok()) status = ReadScale(spec, &request.scale);
   if (!status.ok()) return tl::unexpected(std::move(status));
   return request;
 }

@@ -168,6 +168,7 @@ std::string EncodeStart(const MeshRequest& request, SystemTime create_time) {
   writer.Bytes(request.label);
   writer.Bytes(request.about);
   writer.Strings(request.region_names);
+  writer.Numbers(request.scale);
   writer.Number(ToNumber(create_time));
   writer.Number(request.timeouts.answer_limit.count());
   writer.Number(request.timeouts.worker_wait.count());
@@ -186,6 +187,7 @@ bool DecodeStart(std::string_view record, MeshRequest* request, SystemTime* crea
   reader.Bytes(request->label);
   reader.Bytes(request->about);
   reader.Strings(request->region_names);
+  reader.Numbers(request->scale);
   reader.Number(time);
   reader.Number(answer_limit);
   reader.Number(worker_wait);
@@ -196,7 +198,8 @@ bool DecodeStart(std::string_view record, MeshRequest* request, SystemTime* crea
   request->timeouts.answer_limit = Clock::duration(answer_limit);
   request->timeouts.worker_wait = Clock::duration(worker_wait);
   request->timeouts.busy_limit = Clock::duration(busy_limit);
-  return reader.Complete();
+  const Index axes = request->scale.size();
+  return reader.Complete() && (axes == 0 || axes == request->spec.ambient_dimension);
 }
 
 std::vector<AnswerRange> Merged(std::vector<AnswerRange> ranges) {

@@ -4,6 +4,7 @@
 #include "core/base/message.h"
 #include "server/convert/error_map.h"
 #include "server/convert/mesh.h"
+#include "server/convert/scale.h"
 #include "server/rpc/history_stream.h"
 #include "server/rpc/rpcs.h"
 
@@ -48,7 +49,8 @@ class DownloadStream final
     if (!cursor_) Begin();
     if (!cursor_) return Step::kWait;
     const core::Specification& spec = session().request().spec;
-    const DeltaPart part = history()->Next(&*cursor_, PartBytes());
+    DeltaPart part = history()->Next(&*cursor_, PartBytes());
+    ToOwnCoordinates(session().request().scale, &part.points);
     ToProto(part, spec.simplex_dimension(), spec.ambient_dimension, response());
     response()->set_vertices(snapshot_.vertices);
     response()->set_simplices(snapshot_.simplices);

@@ -3,6 +3,7 @@
 #include "core/base/message.h"
 #include "server/convert/error_map.h"
 #include "server/convert/mesh.h"
+#include "server/convert/scale.h"
 #include "server/rpc/history_stream.h"
 #include "server/rpc/rpcs.h"
 
@@ -67,7 +68,8 @@ class WatchStream final : public HistoryStream<v1::WatchMeshRequest, v1::WatchMe
 
   void TakePart() {
     const core::Specification& spec = session().request().spec;
-    const DeltaPart part = history()->Next(&*cursor_, PartBytes());
+    DeltaPart part = history()->Next(&*cursor_, PartBytes());
+    ToOwnCoordinates(session().request().scale, &part.points);
     ToProto(part, spec.simplex_dimension(), spec.ambient_dimension, response()->mutable_delta());
     if (!part.complete) return;
     at_ = cursor_->to;

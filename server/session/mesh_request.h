@@ -1,5 +1,6 @@
 #pragma once
 
+#include <Eigen/Core>
 #include <optional>
 #include <string>
 #include <vector>
@@ -17,6 +18,8 @@ struct MeshRequest {
   std::string label;                      // the client's
   std::string about;                      // what its oracle says of itself, printable
   std::vector<std::string> region_names;  // of labels 1, 2, ..., printable; an empty one is none
+  // Of axes of different units, d: what is delivered is x = y * scale of what is meshed; or empty.
+  Eigen::VectorXd scale;
   core::Specification spec;
   OracleTimeouts timeouts;
   // Set: the mesh is made of points, not of answers. `spec` then has its dimensions alone.

@@ -212,6 +212,7 @@ CLIENTS = {
         "clients/cpp/include",
         "clients/cpp/mesh",
         "clients/cpp/net",
+        "clients/cpp/oracles",  # how axes of different units are checked, and said
         "clients/cpp/wire",
         "proto",
     ),

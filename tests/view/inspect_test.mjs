@@ -194,6 +194,23 @@ test("cut open, a solid shows what is inside, a surface its edge", async () => {
   assert.equal((await picture(page)).share, 0, "nothing is left");
 });
 
+test("axes of different units are drawn as one, and said in their own", async () => {
+  const page = await see({ shape: "ellipsoid", epsilon: 0.35, label: "of three units" });
+  const [width, height] = (await picture(page)).sides;
+  assert.ok(Math.abs(width / height - 1) < 0.1, `drawn as a sphere: ${width} x ${height}`);
+  const length = await page.locator("#overlay .length").getAttribute("aria-label");
+  assert.match(length, / of x \/ scale$/);
+  await page.locator("#find-ids").fill("7");
+  await page.keyboard.press("Enter");
+  await until(page, () => document.getElementById("found-title").textContent === "vertex 7");
+  const [x, y, z] = (await rows(page, "found-rows")).coordinates.split(", ").map(Number);
+  assert.ok(Math.abs((x / 0.01) ** 2 + (y / 500) ** 2 + z ** 2 - 1) < 1e-3, `${x}, ${y}, ${z}`);
+  const [head, ...lines] = (await saved(page, "txt")).trim().split("\n");
+  const points = lines.slice(0, Number(head.split(" ")[2])).map((line) => line.split(" ").map(Number));
+  const most = [0, 1, 2].map((i) => Math.max(...points.map((point) => Math.abs(point[i]))));
+  assert.ok(most[0] < 0.0101 && most[1] > 400 && most[1] < 505 && most[2] < 1.01, `${most}`);
+});
+
 test("a mesh is saved as programs read it: its triangles are turned outwards", async () => {
   const page = await see({ shape: "torus", epsilon: 0.2, label: "a torus" });
   const lines = (await saved(page, "obj")).split("\n");

@@ -59,7 +59,20 @@ class Held:
         return self._oracle.closest_point(x)
 
 
+def ellipsoid() -> object:
+    """Its axes have different units, by which it is a sphere."""
+    scale = np.array([0.01, 500.0, 1.0])
+    own = stellate.ImplicitManifold(
+        lambda x: ((x / scale) ** 2).sum(axis=1) - 1,
+        ambient_dimension=3,
+        dimension=2,
+        bounding_box=(-1.3 * scale, 1.3 * scale),
+    )
+    return oracles.in_units(own, scale)
+
+
 SHAPES = {
+    "ellipsoid": ellipsoid,
     "circle": lambda: manifolds.Sphere(1),
     "four-sphere": lambda: manifolds.Sphere(4),
     "torus": lambda: manifolds.Torus(1.0, 0.4),

@@ -54,7 +54,10 @@ EquationSystem::Jacobian Shaped(ImplicitOracle::Jacobian jacobian, Index equatio
 
 ImplicitOracle::ImplicitOracle(int dimension, int ambient_dimension, Function f, Jacobian jacobian,
                                BoundingBox box)
-    : PointwiseOracle(dimension, ambient_dimension), f_(std::move(f)), box_(std::move(box)) {
+    : PointwiseOracle(dimension, ambient_dimension),
+      f_(std::move(f)),
+      jacobian_(std::move(jacobian)),
+      box_(std::move(box)) {
   if (dimension < 1 || dimension >= ambient_dimension) {
     throw std::invalid_argument("ImplicitOracle needs 1 <= dimension < ambient_dimension");
   }
@@ -68,7 +71,7 @@ ImplicitOracle::ImplicitOracle(int dimension, int ambient_dimension, Function f,
   const double largest =
       std::max(box_.lower.lpNorm<Eigen::Infinity>(), box_.upper.lpNorm<Eigen::Infinity>());
   system_ = std::make_shared<const EquationSystem>(
-      Shaped(f_, equations()), Shaped(std::move(jacobian), equations()), equations(),
+      Shaped(f_, equations()), Shaped(jacobian_, equations()), equations(),
       (box_.upper - box_.lower).norm(), largest);
 }
 
@@ -115,6 +118,20 @@ void ImplicitOracle::Tangent(const VectorXd& y, MatrixXd& tangent) const {
   const MatrixXd jacobian = system_->SlopesAt(y);
   if (!jacobian.allFinite()) RefuseEnd(y);
   tangent = NullSpace(jacobian);
+}
+
+std::shared_ptr<Oracle> ImplicitOracle::DividedBy(const VectorXd& scale) const {
+  const Function f = [f = f_, scale](const VectorXd& y) { return f(y.cwiseProduct(scale)); };
+  Jacobian jacobian;
+  if (jacobian_) {
+    jacobian = [own = jacobian_, scale](const VectorXd& y) -> MatrixXd {
+      MatrixXd slopes = own(y.cwiseProduct(scale));
+      if (slopes.cols() == scale.size()) slopes = slopes * scale.asDiagonal();
+      return slopes;  // which J refuses else
+    };
+  }
+  const BoundingBox box{box_.lower.cwiseQuotient(scale), box_.upper.cwiseQuotient(scale)};
+  return std::make_shared<ImplicitOracle>(dimension(), ambient_dimension(), f, jacobian, box);
 }
 
 MatrixXd ImplicitOracle::EquationGradients(const MatrixXd& points) {

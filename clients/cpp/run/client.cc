@@ -6,6 +6,7 @@
 #include "run/declare.h"
 #include "run/host.h"
 #include "run/run.h"
+#include "run/scaled.h"
 #include "shared/auto.h"
 #include "stellate/monitor.h"
 
@@ -16,8 +17,11 @@ namespace {
 // Meshes, again and finer where epsilon was to be chosen, and gives the last mesh to `deliver`,
 // while the server has it.
 template <typename Result, typename Deliver>
-Expected<Result> Repeat(Oracle& oracle, const MeshOptions& options, client::Run::Watching watching,
+Expected<Result> Repeat(Oracle& own, const MeshOptions& options, client::Run::Watching watching,
                         const Deliver& deliver) {
+  const Expected<std::shared_ptr<Oracle>> scaled = client::Scaled(own, options);
+  if (!scaled) return tl::unexpected(scaled.error());
+  Oracle& oracle = **scaled;
   const Expected<client::Host> host = client::Host::Find(options.connection);
   if (!host) return tl::unexpected(host.error());
   Expected<client::Request> request = client::Settle(*host, oracle, options);

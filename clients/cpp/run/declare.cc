@@ -8,6 +8,7 @@
 
 #include "net/channel.h"
 #include "run/check.h"
+#include "run/scaled.h"
 #include "stellate/serve.h"
 #include "wire/convert.h"
 #include "wire/status.h"
@@ -103,12 +104,14 @@ Expected<std::string> DeclareMesh(Oracle& oracle, const MeshOptions& options) {
   if (options.connection.server.empty()) {
     return Fail(ErrorCode::kRefused, "no server is given: say where the mesh is to be");
   }
+  const Expected<std::shared_ptr<Oracle>> scaled = client::Scaled(oracle, options);
+  if (!scaled) return tl::unexpected(scaled.error());
   const Expected<client::Host> host = client::Host::Find(options.connection);
   if (!host) return tl::unexpected(host.error());
-  const Expected<client::Request> request = client::Settle(*host, oracle, options);
+  const Expected<client::Request> request = client::Settle(*host, **scaled, options);
   if (!request) return tl::unexpected(request.error());
   const auto mesh =
-      client::CreateMesh(*v1::Stellate::NewStub(host->channel), oracle, request->options,
+      client::CreateMesh(*v1::Stellate::NewStub(host->channel), **scaled, request->options,
                          {options.connection.reconnect, host->channel, host->IsHopeless(),
                           options.connection.on_outage});
   if (!mesh) return tl::unexpected(mesh.error());

@@ -3,14 +3,17 @@
 #include <google/protobuf/empty.pb.h>
 #include <openssl/evp.h>
 
+#include <Eigen/QR>
 #include <algorithm>
 #include <bit>
 #include <chrono>
 #include <memory>
+#include <stdexcept>
 #include <utility>
 
 #include "net/channel.h"
 #include "net/reconnect.h"
+#include "oracles/combined/units.h"
 #include "run/host.h"
 #include "stellate/download.h"
 #include "stellate/v1/stellate.grpc.pb.h"
@@ -182,12 +185,76 @@ Expected<void> Check(const Eigen::MatrixXd& points, const ReconstructOptions& op
   return {};
 }
 
+// Axes of different units.
+class Scale {
+ public:
+  // kRefused.
+  static Expected<Scale> Of(const std::vector<double>& scale, Eigen::Index d) {
+    const auto axes = static_cast<Eigen::Index>(scale.size());
+    try {
+      return Scale(oracles::UnitsOf(Eigen::Map<const Eigen::VectorXd>(scale.data(), axes), d));
+    } catch (const std::invalid_argument& refusal) {
+      return Fail(ErrorCode::kRefused, refusal.what());
+    }
+  }
+
+  // kRefused for those that become infinite.
+  Expected<Eigen::MatrixXd> Divided(const Eigen::MatrixXd& points) const {
+    Eigen::MatrixXd divided = points.array().colwise() / units_.array();
+    if (divided.allFinite()) return divided;
+    return Fail(ErrorCode::kRefused, "points / scale are not finite");
+  }
+
+  // The tangent spaces there, by orthonormal vectors.
+  Eigen::MatrixXd Tangents(const Eigen::MatrixXd& tangents, Eigen::Index k) const {
+    using Basis = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
+    const Eigen::Index d = units_.size();
+    Eigen::MatrixXd scaled(tangents.rows(), tangents.cols());
+    for (Eigen::Index j = 0; j < tangents.cols(); ++j) {
+      const Eigen::Map<const Basis> own(tangents.col(j).data(), d, k);
+      const Eigen::MatrixXd there = own.array().colwise() / units_.array();
+      Eigen::Map<Basis>(scaled.col(j).data(), d, k) =
+          there.householderQr().householderQ() * Eigen::MatrixXd::Identity(d, k);
+    }
+    return scaled;
+  }
+
+  // The mesh of points / scale as that of the points, to their last bit.
+  Mesh Own(Mesh mesh, const Eigen::MatrixXd& points) const {
+    mesh.points.array().colwise() *= units_.array();
+    const Eigen::Index n = std::min(points.cols(), mesh.points.cols());
+    mesh.points.leftCols(n) = points.leftCols(n);
+    const std::string words = oracles::AboutUnits(units_);
+    mesh.report.certificate.verdict += "; " + words;
+    mesh.report.text += "        scale  " + words + "\n";
+    return mesh;
+  }
+
+ private:
+  explicit Scale(Eigen::VectorXd units) : units_(std::move(units)) {}
+
+  Eigen::VectorXd units_;  // d
+};
+
 }  // namespace
 }  // namespace client
 
 Expected<Mesh> Reconstruct(const Eigen::MatrixXd& points, const ReconstructOptions& options,
                            const Eigen::MatrixXd& tangents) {
   if (auto ok = client::Check(points, options, tangents); !ok) return tl::unexpected(ok.error());
+  if (!options.scale.empty()) {
+    const auto scale = client::Scale::Of(options.scale, points.rows());
+    if (!scale) return tl::unexpected(scale.error());
+    const auto divided = scale->Divided(points);
+    if (!divided) return tl::unexpected(divided.error());
+    ReconstructOptions plain = options;
+    plain.scale.clear();
+    Expected<Mesh> mesh =
+        Reconstruct(*divided, plain,
+                    tangents.size() > 0 ? scale->Tangents(tangents, options.dimension) : tangents);
+    if (mesh) return scale->Own(*std::move(mesh), points);
+    return mesh;
+  }
   const Expected<client::Host> host = client::Host::Find(options.connection);
   if (!host) return tl::unexpected(host.error());
   client::Upload upload(host->channel, points, tangents, options, host->IsHopeless());

@@ -167,6 +167,8 @@ Expected<v1::MeshSpec> ToSpec(Oracle& oracle, const MeshOptions& options) {
     auto* const walls = spec.add_closures();
     for (const int wall : closure) walls->add_walls(static_cast<std::uint32_t>(wall));
   }
+  const Eigen::VectorXd scale = oracle.coordinate_scale();
+  spec.mutable_scale()->Add(scale.begin(), scale.end());
   for (std::string& name : oracle.region_names()) spec.add_region_names(std::move(name));
   if (const auto box = oracle.bounding_box()) {
     // Shape [d]: a corner is one point, not a list of them.

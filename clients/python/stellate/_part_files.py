@@ -33,12 +33,8 @@ def stream(
     info: MeshInfo,
     files: Sequence[str],
     on_part: OnPart | None = None,
-    units: np.ndarray | None = None,
 ) -> SavedMesh | None:
     """The last revision of a mesh that is over, straight into files, with `info`'s report.
-
-    Args:
-      units: (d,), by which points are multiplied.
 
     Returns: None, and no files, where the mesh has to be fetched whole.
     """
@@ -58,7 +54,7 @@ def stream(
             )
             for part in itertools.chain([first], parts):
                 try:
-                    sink.take(part, units)
+                    sink.take(part)
                 except ValueError as error:
                     raise protocol_error(str(error)) from error
                 if on_part is not None:
@@ -95,7 +91,7 @@ class _Sink:
         self._last = np.empty((0, shape.dimension + 1), dtype=np.int64)  # the simplex before
         self.vertices = self.simplices = 0
 
-    def take(self, part: Any, units: np.ndarray | None) -> None:
+    def take(self, part: Any) -> None:
         """Raises: ValueError for what makes no sense; _NotSo."""
         block = from_wire(part.points, -1, self._shape.ambient_dimension)
         rows = indices_from_wire(part.cells, -1, self._shape.dimension + 1).astype(np.int64)
@@ -105,7 +101,7 @@ class _Sink:
         before = self.vertices
         self.vertices, self.simplices = self.vertices + len(block), self.simplices + len(rows)
         if len(block):
-            self._add_points(block if units is None else block * units)
+            self._add_points(block)
         if self._spool is not None:
             for on, bits in walls_from_wire(part, self.vertices):
                 if int(on.min()) < before:

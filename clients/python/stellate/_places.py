@@ -10,6 +10,7 @@ import numpy as np
 
 from ._mesh import Mesh
 from .errors import StellateError
+from .oracle import CheckedOracle
 from .report import Report
 
 _NUMBER = r"-?(?:\d+\.?\d*(?:e[+-]?\d+)?)"
@@ -22,9 +23,15 @@ _MOST_SHOWN = 6  # coordinates, as servers write them
 class Places:
     """Of an oracle that has `coordinates`: see stellate.Oracle. Of others nothing changes."""
 
-    def __init__(self, oracle: Any) -> None:
+    def __init__(self, oracle: Any, *, asked: bool = False) -> None:
+        """`asked`: in what the oracle says, who is asked in x / scale where there is a scale; else in what a
+        server says, in x."""
         given = getattr(oracle, "coordinates", None)
         self._coordinates: Callable[[Any], Any] | None = given if callable(given) else None
+        scale = np.array(CheckedOracle(oracle).coordinate_scale)
+        if asked and len(scale):
+            plain = self._coordinates
+            self._coordinates = lambda y: y * scale if plain is None else plain(y * scale)
 
     @property
     def known(self) -> bool:

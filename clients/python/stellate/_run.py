@@ -22,15 +22,16 @@ from ._mesh import FinishedMesh, Mesh, with_report
 from ._part_files import stream
 from ._places import Places
 from ._saved import SavedMesh
-from ._scale import Scale
 from ._shared import table
 from ._wire.spec import mesh_spec
 from ._worker import Ask, answer, check_max_chunk, join_all
 from .client import Client, MeshInfo
 from .errors import Interrupted, InvalidArgument, SaveError, StellateError
-from .oracle import CheckedOracle
+from .oracle import CheckedOracle, points_of
+from .oracles import in_units
 from .oracles import kept as part_of
 from .oracles._kept import Keep
+from .oracles._units import units_of
 from .progress import progress_bar
 from .report import Report
 from .server import Server
@@ -162,11 +163,14 @@ class Run:
             )
         max_chunk = check_max_chunk(options.pop("max_chunk", None))
         self._coordinate_names = CheckedOracle(oracle).coordinate_names
-        self._scale: Scale | None = None
+        self._d = CheckedOracle(oracle).ambient_dimension
         if scale is not None:
-            self._scale = Scale(scale, CheckedOracle(oracle).ambient_dimension)
-            oracle, options = self._scale.oracle(oracle), self._scale.options(options)
-        self._places, self._d = Places(oracle), CheckedOracle(oracle).ambient_dimension
+            if "seeds" in options:
+                units = units_of(scale, self._d)
+                options["seeds"] = points_of(options["seeds"], self._d) / units
+            oracle = in_units(oracle, scale)
+        self._places, self._asked_places = Places(oracle), Places(oracle, asked=True)
+        self._units = np.array(CheckedOracle(oracle).coordinate_scale or 1.0)
         if keep is not None:
             oracle = part_of(oracle, keep, options.get("seeds"))
         checked = CheckedOracle(oracle)
@@ -330,7 +334,7 @@ class Run:
                 if self._every or self._next is None:
                     yield mesh
         except StellateError as error:
-            self._in_own_words(error)  # by the mesh as the server has it
+            self._places.in_error(error, self._d)  # by the mesh as the server has it
             if isinstance(error.mesh, Mesh):  # the server says that it is over
                 error.mesh = mesh = self._told(error.mesh)
                 full = error.reason.startswith("JOURNAL_")  # with more room it goes on
@@ -362,8 +366,7 @@ class Run:
                 nowhere = Mesh(np.empty((0, self._d)), np.empty((0, info.dimension + 1), np.int64))
                 told = self._told(with_report(nowhere, report))
                 final = dataclasses.replace(info, report=told.report)
-                units = None if self._scale is None else self._scale.units
-                saved = stream(client, final, self._to, units=units)
+                saved = stream(client, final, self._to)
                 if saved is not None:
                     return dataclasses.replace(saved, name=told.name)
             mesh = self._told(assemble(client, info, 0, None))
@@ -388,9 +391,9 @@ class Run:
         return ours
 
     def _in_own_words(self, error: BaseException) -> BaseException:
-        """With its places in the coordinates that people know them by."""
+        """What the oracle raised, with places in the coordinates that people know them by."""
         if isinstance(error, StellateError):
-            return self._places.in_error(error, self._d)
+            return self._asked_places.in_error(error, self._d)
         return error
 
     def interrupt(self) -> None:
@@ -426,16 +429,14 @@ class Run:
     def _told(self, mesh: M) -> M:
         """With what the server does not know: why epsilon is what it is, where the oracle's manifold
         ends, and the coordinates that people know places by."""
-        points = mesh.points
         mesh = self._places.in_mesh(mesh)
-        if self._scale is not None:
-            mesh = self._scale.mesh(mesh)
         mesh = dataclasses.replace(mesh, coordinate_names=self._coordinate_names)
         report = mesh.report
         if report is None:
             return mesh
         if self._where_it_ends is not None and report.termination == "NO_PROGRESS":
-            end = self._places.in_words(self._where_it_ends(), points)
+            asked = mesh.points / self._units
+            end = self._asked_places.in_words(self._where_it_ends(), asked)
             if end:
                 report = report.refused(f"{end}. The run ended as NO_PROGRESS")
         if self._epsilon_reason:

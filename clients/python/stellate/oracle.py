@@ -63,6 +63,8 @@ class Oracle(Protocol):
       bounding_box: (lower (d,), upper (d,)), where to look for M, or
       seeds: (m, d), points near M, one at least on each component. One of the two is needed.
       in_units(scale (d,)) -> oracle: of {x / scale : x in M}, for stellate.mesh(..., scale=).
+      coordinate_scale: (d,), set by oracles.in_units: the mesh's points, and the places in what a server
+        says of it, are delivered multiplied by it.
       thread_safe: True lets several workers call it at the same time.
       about: a str, one sentence that it says of itself, for people, such as what it was fitted with:
         the verdict ends with its first 300 characters, as the oracle's own words.
@@ -97,6 +99,7 @@ class CheckedOracle:
         self.closures = _closures(getattr(oracle, "closures", ()))
         self.region_names = _names(getattr(oracle, "region_names", ()))
         self.coordinate_names = _names_of_coordinates(oracle, self.ambient_dimension)
+        self.coordinate_scale = tuple(map(float, getattr(oracle, "coordinate_scale", ())))
         self.about = _sentence(getattr(oracle, "about", ""))
         self.bounding_box = _box(getattr(oracle, "bounding_box", None))
         seeds = getattr(oracle, "seeds", None)

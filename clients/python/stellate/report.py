@@ -426,14 +426,11 @@ class Report:
         text = "".join(entry(title, mine.get(title, said)) for title, said in self.lines())
         return dataclasses.replace(self, certificate=certificate, text=text)
 
-    def with_words(self, words: str) -> Report:
-        """The verdict, and these words after it."""
+    def with_line(self, title: str, words: str) -> Report:
+        """With a line more at its end, and its words at the end of the verdict."""
         verdict = f"{self.certificate.verdict}; {words}"
-        text = "".join(
-            entry(title, f"{said}; {words}") if title == "certificate" else _as_it_was(title, said)
-            for title, said in dataclasses.replace(self, epsilon_reason="").lines()
-        )
         certificate = dataclasses.replace(self.certificate, verdict=verdict)
+        text = self.text.rstrip("\n") + "\n" + entry(title, words)
         return dataclasses.replace(self, certificate=certificate, text=text)
 
     def reworded(self, words: Callable[[str], str]) -> Report:
@@ -447,7 +444,8 @@ class Report:
         for title, said in dataclasses.replace(self, epsilon_reason="").lines():
             before = said.replace("\n", " ")
             after = words(before)
-            text += _as_it_was(title, said) if after == before else entry(title, after)
+            as_it_was = f"{title:>{_TITLE_WIDTH}}  " + said.replace("\n", "\n" + _MARGIN) + "\n"
+            text += as_it_was if after == before else entry(title, after)
         return dataclasses.replace(self, failure=failure, certificate=certificate, text=text)
 
     def __str__(self) -> str:
@@ -480,11 +478,6 @@ def entry(title: str, words: str) -> str:
     """A line of a report, folded as the server folds its own."""
     lines = textwrap.wrap(words, 85, break_long_words=False, break_on_hyphens=False)
     return f"{title:>{_TITLE_WIDTH}}  " + f"\n{_MARGIN}".join(lines) + "\n"
-
-
-def _as_it_was(title: str, said: str) -> str:
-    """A line, or several that are folded, of Report.lines()."""
-    return f"{title:>{_TITLE_WIDTH}}  " + said.replace("\n", "\n" + _MARGIN) + "\n"
 
 
 def _certificate(message: pb.Certificate) -> Certificate:

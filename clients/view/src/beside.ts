@@ -135,7 +135,8 @@ export class Beside {
     } else if (message.type === "scene" && this.look && this.view) {
       const curve = this.row?.k === 1;
       this.view.show(message, css(curve ? "--curve" : "--mesh"), css("--text"), curve);
-      this.overlay.show(this.look.frame, { name: "", scale: message.scale });
+      const scaled = this.row?.scaled ?? false;
+      this.overlay.show(this.look.frame, { name: "", scale: message.scale, scaled });
     }
   }
 

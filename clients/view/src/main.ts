@@ -424,7 +424,8 @@ const hear: { [T in FromWorker["type"]]: (m: Extract<FromWorker, { type: T }>) =
     }
     const plain = css(mesh?.k === 1 ? "--curve" : "--mesh");
     view.show(scene, plain, css("--text"), mesh?.k === 1);
-    overlay.show(look.frame, { name: colourName(), scale: scene.scale });
+    const scaled = mesh?.scaled ?? false;
+    overlay.show(look.frame, { name: colourName(), scale: scene.scale, scaled });
   },
 };
 view.onDrawn = (scene) => {

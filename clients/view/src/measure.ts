@@ -26,11 +26,11 @@ export class Simplices {
   }
 
   private dot(o: number, p: number, q: number): number {
-    const { points, d } = this.store;
+    const { points, d, units } = this.store;
     let sum = 0;
     for (let i = 0; i < d; i++) {
       const at = points[o * d + i];
-      sum += (points[p * d + i] - at) * (points[q * d + i] - at);
+      sum += (((points[p * d + i] - at) / units[i]) * (points[q * d + i] - at)) / units[i];
     }
     return sum;
   }

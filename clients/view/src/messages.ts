@@ -23,6 +23,7 @@ export interface MeshRow {
   walls: number;
   regions: number[]; // their labels, where there are any
   boundaryOnly: boolean;
+  scaled: boolean; // its axes have different units: lengths are of coordinates divided by these
   ofPoints: boolean; // a reconstruction: no oracle, no epsilon, no rules
   places: number[]; // of a reconstruction that is over: what became of its points, as of kPlaces
   certified: boolean | null; // null: not over

@@ -20,6 +20,7 @@ interface Colours {
 export interface Legend {
   name: string; // of what is coloured by
   scale: Scale | null;
+  scaled: boolean; // lengths are of coordinates divided by their axes' units
 }
 
 // A text with a rim of the background's colour, that is read on any mesh.
@@ -49,7 +50,7 @@ export function roundLength(most: number): number {
 
 export class Overlay {
   private frame: number[] = [];
-  private legend: Legend = { name: "", scale: null };
+  private legend: Legend = { name: "", scale: null, scaled: false };
 
   constructor(
     private readonly svg: SVGSVGElement,
@@ -107,11 +108,12 @@ export class Overlay {
   private length({ pixels, bottom }: Sight, { line, ground }: Colours): SVGElement {
     const length = roundLength(130 / pixels);
     const [x, y, w] = [120, bottom - 26, length * pixels];
-    const group = mark("g", { class: "length", role: "img", "aria-label": `length ${length}` });
+    const said = this.legend.scaled ? `${length} of x / scale` : `${length}`;
+    const group = mark("g", { class: "length", role: "img", "aria-label": `length ${said}` });
     const path = `M${x} ${y - 4}v8M${x} ${y}h${w}M${x + w} ${y - 4}v8`;
     group.append(
       mark("path", { d: path, stroke: line, "stroke-width": 2, fill: "none" }),
-      word({ x: x + w / 2, y: y - 8, "text-anchor": "middle" }, `${length}`, ground),
+      word({ x: x + w / 2, y: y - 8, "text-anchor": "middle" }, said, ground),
     );
     return group;
   }

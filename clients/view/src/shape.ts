@@ -7,11 +7,11 @@ import { faces, kMostSegments, slice } from "./slice";
 import type { MeshStore } from "./store";
 
 export function project(store: MeshStore, frame: number[]): Float32Array {
-  const { d, points, vertices } = store;
+  const { d, points, vertices, units } = store;
   const out = new Float32Array(3 * vertices);
   const terms: [row: number, column: number, weight: number][] = [];
   frame.forEach((weight, i) => {
-    if (weight !== 0) terms.push([Math.floor(i / d), i % d, weight]);
+    if (weight !== 0) terms.push([Math.floor(i / d), i % d, weight / units[i % d]]);
   });
   for (const [row, column, weight] of terms) {
     for (let v = 0; v < vertices; v++) out[3 * v + row] += weight * points[v * d + column];

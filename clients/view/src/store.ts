@@ -28,9 +28,12 @@ export class MeshStore {
   // Open addressing: which simplex is where in `cells`. -1: free.
   private table = new Int32Array(1024).fill(-1);
 
+  // `units`: of the axes, where they have different ones; the mesh is drawn, and measured, divided by
+  // these.
   constructor(
     readonly k: number,
     readonly d: number,
+    readonly units: ArrayLike<number> = new Float64Array(d).fill(1),
   ) {}
 
   clear() {

@@ -49,6 +49,7 @@ export function rowOf(mesh: Mesh): MeshRow {
     walls: mesh.spec?.walls ?? 0,
     regions: [...new Set(mesh.spec?.labels)].filter((label) => label > 0).sort((a, b) => a - b),
     boundaryOnly: mesh.spec?.boundaryOnly ?? false,
+    scaled: (mesh.spec?.scale.length ?? 0) > 0,
     ofPoints: mesh.spec?.reconstruction !== undefined,
     places: mesh.report?.reconstruction?.places.map(({ place }) => place) ?? [],
     certified: isOver(mesh) ? (mesh.report?.certificate?.certified ?? false) : null,

@@ -106,7 +106,9 @@ export class Viewing {
   private hear(mesh: Mesh) {
     if (this.stop.signal.aborted) return;
     if (this.store === null) {
-      this.store = new MeshStore(simplexDimension(mesh.spec!), mesh.spec!.ambientDimension);
+      const { ambientDimension: d, scale } = mesh.spec!;
+      const units = scale.length === d ? scale : undefined;
+      this.store = new MeshStore(simplexDimension(mesh.spec!), d, units);
     }
     const ended = mesh.endTime !== undefined;
     this.mesh = mesh;
@@ -210,7 +212,7 @@ export class Viewing {
   }
 
   private async download(revision: number): Promise<MeshStore | null> {
-    const store = new MeshStore(this.store!.k, this.store!.d);
+    const store = new MeshStore(this.store!.k, this.store!.d, this.store!.units);
     const request = create(DownloadMeshRequestSchema, {
       name: this.name,
       revision: BigInt(revision),
@@ -391,15 +393,15 @@ export class Viewing {
 
 // The same size from all sides, so that a tour does not breathe.
 function ballOf(store: MeshStore, { frame }: Look): Pick<Scene, "centre" | "radius"> {
-  const { d, vertices, points } = store;
+  const { d, vertices, points, units } = store;
   const middle = Array.from({ length: d }, (_, axis) => {
     const [low, high] = extent(store, axis);
-    return (low + high) / 2;
+    return (low + high) / 2 / units[axis];
   });
   let radius = 0;
   for (let v = 0; v < vertices; v++) {
     let squared = 0;
-    for (let i = 0; i < d; i++) squared += (points[v * d + i] - middle[i]) ** 2;
+    for (let i = 0; i < d; i++) squared += (points[v * d + i] / units[i] - middle[i]) ** 2;
     if (squared > radius) radius = squared;
   }
   const centre = [0, 1, 2].map((row) =>

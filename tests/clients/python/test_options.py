@@ -49,6 +49,7 @@ class Everything:
     labels = [0, 1, 2, -1, -1, 1, 2, 0]
     closures = [(0, 1, 2)]
     region_names = ["core", "shell"]
+    coordinate_scale = [1.0, 2.0, 3.0]
     bounding_box = [-1.0] * 3, [1.0] * 3
     seeds = np.ones((1, 3))
 

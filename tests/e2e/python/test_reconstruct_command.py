@@ -49,6 +49,22 @@ def test_standard_input_and_more_columns(torus, tmp_path):
     assert json.loads(done.stdout)["certificate"]["certified"]
 
 
+def test_axes_of_different_units(torus, tmp_path):
+    units = np.array([2.0**-7, 512.0, 1.0])
+    np.savetxt(tmp_path / "units.xyz", torus * units, "%.17g")
+    scale = "--scale=0.0078125,512,1"
+    done = reconstruct("units.xyz", "-k", 2, scale, "-o", "t.txt", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    mesh, python = stellate.load_txt(tmp_path / "t.txt"), stellate.reconstruct(torus, 2)
+    assert mesh.points.tobytes() == (torus * units).tobytes()
+    assert np.array_equal(mesh.simplices, python.simplices)
+    words = "coordinates were divided by 0.0078125, 512, 1, and lengths and angles are of these"
+    assert done.stdout.rstrip().endswith(f"\n{'scale':>13}  {words}")
+    for wrong in ("--scale=1,2", "--scale=1,2,0", "--scale=1,2,inf"):
+        refused = reconstruct("units.xyz", "-k", 2, wrong, cwd=tmp_path)
+        assert refused.returncode == 2 and "scale has to be 3 positive" in refused.stderr
+
+
 def test_columns_of_a_scan(torus, tmp_path):
     rows = "\n".join(f"12:00,{x:.17g},{y:.17g},{z:.17g},7" for x, y, z in torus)
     (tmp_path / "scan.csv").write_text(f"time,x,y,z,intensity\n{rows}\n")

@@ -6,6 +6,7 @@
 #include "server/convert/arrays.h"
 #include "server/convert/mesh.h"
 #include "server/convert/oracle.h"
+#include "server/convert/scale.h"
 #include "server/convert/spec.h"
 #include "tests/server/support/sphere.h"
 
@@ -137,6 +138,46 @@ TEST(ConvertSpec, NamesOfRegionsAreForPeople) {
   EXPECT_TRUE(refused_for(std::string(129, 'x')).starts_with("region_names[3] has 129 bytes"));
   for (int i = 0; i < 125; ++i) spec.add_region_names("x");
   EXPECT_TRUE(refused_for("y").starts_with("region_names has 129 names but may have 127"));
+}
+
+TEST(ConvertSpec, AScaleHasALengthForEachAxis) {
+  v1::MeshSpec spec = GoodSpec();
+  for (const double unit : {.01, 500., 1.}) spec.add_scale(unit);
+  const auto request = FromProto(spec, Config{});
+  ASSERT_TRUE(request) << request.error().message;
+  EXPECT_EQ(request->scale, Eigen::Vector3d(.01, 500, 1));
+  EXPECT_EQ(FromProto(GoodSpec(), Config{})->scale.size(), 0);
+  spec.set_scale(2, 0);
+  EXPECT_TRUE(FromProto(spec, Config{}).error().message.starts_with("scale has 0 but"));
+  spec.set_scale(2, std::numeric_limits<double>::infinity());
+  EXPECT_TRUE(FromProto(spec, Config{}).error().message.starts_with("scale has inf but"));
+  spec.add_scale(1);
+  EXPECT_TRUE(FromProto(spec, Config{}).error().message.starts_with("scale has 4 numbers but"));
+}
+
+TEST(ConvertScale, DeliversPointsAndPlacesInTheirOwnCoordinates) {
+  const Eigen::Vector3d scale(.01, 500, 1);
+  std::vector<double> points{1, 2, 3, 4, 5, 6};
+  ToOwnCoordinates(scale, &points);
+  EXPECT_EQ(points, (std::vector<double>{.01, 1000, 3, .04, 2500, 6}));
+  const std::string words =
+      "refused at (1, -2e-05, 3.5): simplex (1 2 3) of (1, 2), (1, 2, 3, ...) and (1, 2, 3";
+  EXPECT_EQ(
+      InOwnCoordinates(scale, words),
+      "refused at (0.01, -0.01, 3.5): simplex (1 2 3) of (1, 2), (1, 2, 3, ...) and (1, 2, 3");
+  EXPECT_EQ(InOwnCoordinates({}, words), words);
+  // Of many coordinates the first are written.
+  const Eigen::VectorXd many = Eigen::VectorXd::Constant(9, 2);
+  EXPECT_EQ(InOwnCoordinates(many, "at (1, 2, 3, 4, 5, 6, ...) or (1, 2, 3, 4, 5, 6)"),
+            "at (2, 4, 6, 8, 10, 12, ...) or (1, 2, 3, 4, 5, 6)");
+  v1::Certificate certificate;
+  certificate.set_verdict("at (1, 1, 1)");
+  certificate.add_warnings("near (0, 1, 0)");
+  for (int i = 0; i < 3; ++i) certificate.mutable_sharpest()->add_point(1);
+  ToOwnCoordinates(scale, &certificate);
+  EXPECT_EQ(certificate.verdict(), "at (0.01, 500, 1)");
+  EXPECT_EQ(certificate.warnings(0), "near (0, 500, 0)");
+  EXPECT_EQ(certificate.sharpest().point(1), 500);
 }
 
 TEST(ConvertSpec, SeedsBecomeColumns) {

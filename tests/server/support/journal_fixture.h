@@ -99,6 +99,7 @@ inline SessionOptions RecordedSphere(std::shared_ptr<SessionJournal> journal,
   options.request.owner = "somebody";
   options.request.label = "a sphere";
   options.request.about = "fitted to nothing";
+  options.request.scale = Eigen::Vector3d(0.01, 500, 1);
   options.request.spec = SphereSpec(epsilon);
   options.request.spec.threads = 1;  // oneTBB itself is not built for ThreadSanitizer
   options.request.spec.seeds = Eigen::Vector3d::UnitX();

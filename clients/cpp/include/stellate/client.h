@@ -61,6 +61,11 @@ struct MeshOptions {
   // Cancels the mesh when stop is requested; the mesh so far is returned, not certified.
   std::stop_token stop;
 
+  // Where axes have different units: about how far the manifold goes along each, d lengths above
+  // zero, or one for all. What is meshed is oracles::InUnits(oracle, scale): lengths are of x /
+  // scale, and the mesh and its report's places are in x.
+  std::vector<double> scale;
+
   std::uint64_t random_seed = 1;
   std::optional<std::uint64_t> max_vertices, max_rounds;
   std::optional<std::uint64_t> max_batch_queries;  // larger rounds are sent in several batches

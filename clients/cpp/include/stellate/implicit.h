@@ -40,12 +40,15 @@ class ImplicitOracle : public PointwiseOracle {
   void Tangent(const Eigen::VectorXd& y, Eigen::MatrixXd& tangent) const override;
   int equations() const override { return ambient_dimension() - dimension(); }
   Eigen::MatrixXd EquationGradients(const Eigen::MatrixXd& points) override;
+  // Of the same functions: what a class that derives from this does otherwise is not in it.
+  std::shared_ptr<Oracle> DividedBy(const Eigen::VectorXd& scale) const override;
 
   // F with its solver, for oracles of this library that are made of this one.
   const EquationSystem& system() const;
 
  private:
   Function f_;
+  Jacobian jacobian_;  // may be empty
   BoundingBox box_;
   std::shared_ptr<const Exactness> exactness_;
   std::shared_ptr<const EquationSystem> system_;  // of f_, whose shapes are looked at

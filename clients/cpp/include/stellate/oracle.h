@@ -2,6 +2,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <memory>
 #include <optional>
 #include <stdexcept>
 #include <string>
@@ -143,6 +144,14 @@ class Oracle {
   // Where to look for M: a box, or points near M, at least one on each component.
   virtual std::optional<BoundingBox> bounding_box() const { return std::nullopt; }
   virtual Eigen::MatrixXd seeds() const { return {}; }  // d x m
+
+  // Where axes have different units: the oracle of {x / scale : x in M}, for scale (d) above zero.
+  // It may share what this one is made of, and does not refer to this one. Null: its nearest points
+  // are not known. oracles::InUnits, which asks, goes on asking this one for sizes and names.
+  virtual std::shared_ptr<Oracle> DividedBy(const Eigen::VectorXd& /*scale*/) const { return {}; }
+  // Points of the mesh are delivered multiplied by it, d lengths, as InUnits wants. Empty: as they
+  // are.
+  virtual Eigen::VectorXd coordinate_scale() const { return {}; }
 
   // One sentence that it says of itself, for people, such as what it was fitted with: the verdict
   // ends with its first 300 characters, as the oracle's own words. UTF-8, without controls.

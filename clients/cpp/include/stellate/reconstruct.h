@@ -5,6 +5,7 @@
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <vector>
 
 #include "stellate/connection.h"
 #include "stellate/error.h"
@@ -33,6 +34,10 @@ struct ReconstructOptions {
   // Whether vertices may be added, after the points, where stars disagree and nothing else helps:
   // at most one for each hundred points, or 16.
   bool steiner = false;
+  // Where axes have different units: about how far the manifold goes along each, d lengths above
+  // zero, or one for all. The complex is built in x / scale: noise, reach and the report's lengths,
+  // angles and places are there. Points, tangents and the mesh are in x.
+  std::vector<double> scale = {};
 
   Connection connection;  // without a server: a private one, as of MeshOptions
   std::function<void(const Progress&)> on_progress;  // called on the calling thread

@@ -52,6 +52,9 @@ class Composed : public Oracle {
     return made().Conormals(points, face);
   }
   std::optional<BoundingBox> bounding_box() const override { return made().bounding_box(); }
+  std::shared_ptr<Oracle> DividedBy(const Eigen::VectorXd& scale) const override {
+    return made().DividedBy(scale);
+  }
 
  protected:
   Composed(int dimension, std::function<oracles::Solid()> make);

@@ -37,6 +37,10 @@ class Space final : public Oracle {
     return identity.reshaped().replicate(1, points.cols());
   }
   std::optional<BoundingBox> bounding_box() const override { return around_; }
+  std::shared_ptr<Oracle> DividedBy(const VectorXd& scale) const override {
+    return std::make_shared<Space>(
+        BoundingBox{around_.lower.cwiseQuotient(scale), around_.upper.cwiseQuotient(scale)});
+  }
 
  private:
   BoundingBox around_;
@@ -251,6 +255,23 @@ MatrixXd Clipped::Conormals(const MatrixXd& points, const Walls& face) {
     }
   }
   return outward;
+}
+
+std::shared_ptr<Oracle> Clipped::DividedBy(const VectorXd& scale) const {
+  std::shared_ptr<Oracle> base = base_->DividedBy(scale);
+  if (base == nullptr) return base;
+  std::vector<Wall> walls;
+  for (const Wall& wall : walls_) {
+    Wall& divided = walls.emplace_back();
+    divided.g = [g = wall.g, scale](const VectorXd& y) { return g(y.cwiseProduct(scale)); };
+    if (!wall.gradient) continue;
+    divided.gradient = [own = wall.gradient, scale](const VectorXd& y) -> VectorXd {
+      return own(y.cwiseProduct(scale)).cwiseProduct(scale);
+    };
+  }
+  MatrixXd seeds = seeds_;
+  if (seeds.size() > 0) seeds.array().colwise() /= scale.array();
+  return std::make_shared<Clipped>(std::move(base), std::move(walls), std::move(seeds), labels_);
 }
 
 Solid::Solid(std::vector<Wall> walls, BoundingBox around, MatrixXd seeds,

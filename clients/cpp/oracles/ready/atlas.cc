@@ -210,4 +210,10 @@ bool Parametrized::Atlas::MeetFrom(const Beginning& from, const Eigen::VectorXd&
   return false;
 }
 
+std::vector<Chart> Parametrized::Atlas::DividedBy(const Eigen::VectorXd& scale) const {
+  std::vector<Chart> divided;
+  for (const CheckedChart& chart : charts_) divided.push_back(chart.DividedBy(scale));
+  return divided;
+}
+
 }  // namespace stellate::oracles

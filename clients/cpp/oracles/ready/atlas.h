@@ -21,6 +21,8 @@ class CheckedChart {
 
   // Throws OracleError where the map rounds to single precision.
   void InsistOnExactness() const;
+  // The chart of the points divided by these, (d).
+  Chart DividedBy(const Eigen::VectorXd& scale) const;
   // Throws std::runtime_error for values of another length than the first's.
   Eigen::VectorXd Point(const Eigen::VectorXd& u) const;
   // d x k, as given or by central differences within the box.
@@ -45,6 +47,7 @@ class Parametrized::Atlas {
   int dimension() const { return static_cast<int>(charts_.front().k()); }
   int ambient_dimension() const { return static_cast<int>(tree_->points().rows()); }
   const Eigen::MatrixXd& points() const { return tree_->points(); }
+  std::vector<Chart> DividedBy(const Eigen::VectorXd& scale) const;
 
   // The nearest point of M and an orthonormal basis (d x k) of its tangent space.
   bool Closest(const Eigen::VectorXd& x, Eigen::VectorXd& y, Eigen::MatrixXd& basis) const;

@@ -103,4 +103,18 @@ Eigen::VectorXd CheckedChart::Inside(const Eigen::VectorXd& u) const {
   return inside;
 }
 
+Chart CheckedChart::DividedBy(const Eigen::VectorXd& scale) const {
+  Chart divided = chart_;
+  divided.x = [x = chart_.x, scale](const Eigen::VectorXd& u) -> Eigen::VectorXd {
+    return x(u).cwiseQuotient(scale);
+  };
+  if (!chart_.derivative) return divided;
+  divided.derivative = [own = chart_.derivative, scale](const Eigen::VectorXd& u) {
+    Eigen::MatrixXd slopes = own(u);
+    slopes.array().colwise() /= scale.array();
+    return slopes;
+  };
+  return divided;
+}
+
 }  // namespace stellate::oracles

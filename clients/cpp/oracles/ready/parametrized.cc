@@ -17,6 +17,10 @@ std::optional<BoundingBox> Parametrized::bounding_box() const {
   return BoxAround(atlas_->points(), 0.05);
 }
 
+std::shared_ptr<Oracle> Parametrized::DividedBy(const Eigen::VectorXd& scale) const {
+  return std::make_shared<Parametrized>(atlas_->DividedBy(scale));
+}
+
 bool Parametrized::Project(const Eigen::VectorXd& x, Eigen::VectorXd& y) const {
   Eigen::MatrixXd basis;
   return atlas_->Closest(x, y, basis);

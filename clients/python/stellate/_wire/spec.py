@@ -56,6 +56,7 @@ def mesh_spec(oracle: CheckedOracle, epsilon: float, options: Mapping[str, Any])
     for closure in oracle.closures:
         spec.closures.add(walls=closure)
     spec.region_names.extend(oracle.region_names)
+    spec.scale.extend(oracle.coordinate_scale)
     if oracle.bounding_box is not None:
         lower, upper = oracle.bounding_box
         spec.bounding_box.lower.CopyFrom(to_wire(lower))

@@ -85,7 +85,9 @@ class SeedComponents:
         self.seeds = as_points(seeds, "seeds")
         self.dimension, self.ambient_dimension = base.dimension, base.ambient_dimension
         self.thread_safe = bool(getattr(oracle, "thread_safe", False))
-        self.about = base.about
+        self.about, self.coordinate_scale = base.about, base.coordinate_scale
+        if callable(getattr(oracle, "coordinates", None)):
+            self.coordinates = oracle.coordinates
         if base.bounding_box is not None:
             self.bounding_box = base.bounding_box
         if base.has_intersect_flat:

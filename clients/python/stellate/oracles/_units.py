@@ -17,7 +17,7 @@ _MOST_NAMED = 8  # units in a sentence
 def in_units(oracle: Any, scale: Any) -> Any:
     """The oracle of {x / scale : x in M}; `stellate.mesh(oracle, epsilon, scale=...)` is of it.
 
-    Its nearest points are the nearest in scaled coordinates. It is made of what the oracle is made of:
+    Its nearest points are the nearest in scaled coordinates; its mesh is handed back in x. It is made of what the oracle is made of:
     equations and distances, walls, charts. Any other oracle needs a method
     `in_units(scale (d,)) -> oracle` of its own, unless all axes have one unit.
 
@@ -42,7 +42,10 @@ def in_units(oracle: Any, scale: Any) -> Any:
             "in_units(scale) that returns the oracle of M / scale",
             details={"fields": {"scale": f"{name} cannot be scaled"}},
         )
-    made.coordinates = Before(getattr(oracle, "coordinates", _as_they_are), units)
+    # What a server delivers is in x, and what the oracle raises is not.
+    if callable(getattr(oracle, "coordinates", None)):
+        made.coordinates = oracle.coordinates
+    made.coordinate_scale = units * np.asarray(checked.coordinate_scale or 1.0)
     own = checked.about
     made.about = f"{about_units(units)}{'; ' if own else ''}{own}"
     return made
@@ -69,10 +72,6 @@ def about_units(units: Array) -> str:
     named = [f"{unit:.6g}" for unit in units[:_MOST_NAMED]]
     more = ["..."] if len(units) > _MOST_NAMED else []
     return f"coordinates were divided by {', '.join(named + more)}, and lengths and angles are of these"
-
-
-def _as_they_are(points: Array) -> Array:
-    return points
 
 
 class Before:

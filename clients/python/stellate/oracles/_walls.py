@@ -151,6 +151,7 @@ class Clipped:
             self.intersect_flat = oracle.intersect_flat
         if callable(getattr(oracle, "coordinates", None)):
             self.coordinates = oracle.coordinates
+        self.coordinate_scale = self._base.coordinate_scale
         if self._base.has_local_size:
             self.local_size = oracle.local_size
         self.thread_safe = bool(getattr(oracle, "thread_safe", False))

@@ -67,4 +67,59 @@ class Transformed final : public Oracle {
   Similarity map_;
 };
 
+// A manifold whose axes have different units: what is meshed is {x / scale : x in M}, and the mesh,
+// and the places that its report names, are in x. epsilon and all other lengths are of x / scale.
+// See docs/fields/scaling.md; MeshOptions::scale is this for one mesh.
+//
+//   oracles::InUnits states(oracle, Eigen::Vector3d(0.01, 500, 1));
+//   const auto mesh = stellate::MeshManifold(states, options);  // mesh->points as of `oracle`
+//
+// It takes an oracle that has DividedBy, as those of equations, charts, walls and solids have, or
+// one length for all axes and no walls.
+class InUnits final : public Oracle {
+ public:
+  // `scale` (d): about how far M goes along each axis.
+  InUnits(std::shared_ptr<Oracle> oracle, const Eigen::VectorXd& scale);
+
+  int dimension() const override { return scaled_->dimension(); }
+  int ambient_dimension() const override { return scaled_->ambient_dimension(); }
+  Answer ClosestPoint(const Eigen::MatrixXd& y) override { return scaled_->ClosestPoint(y); }
+  bool has_intersect_flat() const override { return scaled_->has_intersect_flat(); }
+  Answer IntersectFlat(const Eigen::MatrixXd& centers, const Eigen::MatrixXd& bases,
+                       const Eigen::VectorXd& radii) override {
+    return scaled_->IntersectFlat(centers, bases, radii);
+  }
+  bool has_tangent_basis() const override { return scaled_->has_tangent_basis(); }
+  Eigen::MatrixXd TangentBasis(const Eigen::MatrixXd& points) override {
+    return scaled_->TangentBasis(points);
+  }
+  // As the oracle says at x: lengths of x / scale.
+  bool has_local_size() const override { return own_->has_local_size(); }
+  Eigen::VectorXd LocalSize(const Eigen::MatrixXd& points) override;
+  int equations() const override { return scaled_->equations(); }
+  Eigen::MatrixXd EquationGradients(const Eigen::MatrixXd& points) override {
+    return scaled_->EquationGradients(points);
+  }
+  int walls() const override { return scaled_->walls(); }
+  Answer FacePoint(const Eigen::MatrixXd& y, const Walls& face) override {
+    return scaled_->FacePoint(y, face);
+  }
+  Eigen::MatrixXd Clearances(const Eigen::MatrixXd& points) override {
+    return scaled_->Clearances(points);
+  }
+  Eigen::MatrixXd Conormals(const Eigen::MatrixXd& points, const Walls& face) override {
+    return scaled_->Conormals(points, face);
+  }
+  std::vector<std::uint8_t> labels() const override { return scaled_->labels(); }
+  std::vector<std::string> region_names() const override { return own_->region_names(); }
+  std::optional<BoundingBox> bounding_box() const override { return scaled_->bounding_box(); }
+  Eigen::MatrixXd seeds() const override { return scaled_->seeds(); }
+  std::string about() const override;
+  Eigen::VectorXd coordinate_scale() const override { return units_; }
+
+ private:
+  std::shared_ptr<Oracle> own_, scaled_;
+  Eigen::VectorXd units_;
+};
+
 }  // namespace stellate::oracles

@@ -38,6 +38,7 @@ class Parametrized final : public PointwiseOracle {
   Answer IntersectFlat(const Eigen::MatrixXd& centers, const Eigen::MatrixXd& bases,
                        const Eigen::VectorXd& radii) override;
   std::optional<BoundingBox> bounding_box() const override;
+  std::shared_ptr<Oracle> DividedBy(const Eigen::VectorXd& scale) const override;
 
   bool Project(const Eigen::VectorXd& x, Eigen::VectorXd& y) const override;
   void Tangent(const Eigen::VectorXd& y, Eigen::MatrixXd& tangent) const override;

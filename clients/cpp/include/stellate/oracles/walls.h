@@ -77,6 +77,7 @@ class Clipped : public Oracle {
   std::optional<BoundingBox> bounding_box() const override { return base_->bounding_box(); }
   Eigen::MatrixXd seeds() const override { return seeds_; }
   std::string about() const override { return base_->about(); }
+  std::shared_ptr<Oracle> DividedBy(const Eigen::VectorXd& scale) const override;
 
  private:
   void InsistOnExactness(int wall) const;
