@@ -26,7 +26,8 @@ constexpr double kShrinks = 1e-3;  // of a step, at the least what the next one 
 constexpr double kAhead = 1e-3;    // of the tolerance: so short, that one need not be looked for
 constexpr double kShort = 1e4;     // tolerances: halving such a step could only see noise
 // What F may be, in its steepness times the step that is to make it zero: corrections of a Jacobian
-// without full rank, as of walls that never meet, grow beyond all bounds, and steps shrink to nothing.
+// without full rank, as of walls that never meet, grow beyond all bounds, and steps shrink to
+// nothing.
 constexpr double kOutOfStep = 10;
 
 }  // namespace
@@ -111,8 +112,8 @@ class EquationSystem::Way {
     }
     const double shrinks = length / now_.last_step;
     // Not a number where none came before.
-    const bool ahead = length * std::max(shrinks, kShrinks) <= kAhead * system_.tolerance_ &&
-                       !std::isnan(shrinks);
+    const bool ahead =
+        length * std::max(shrinks, kShrinks) <= kAhead * system_.tolerance_ && !std::isnan(shrinks);
     if (shrinks > kSlow) {
       is_old_ = true;
       is_fresh_ = false;

@@ -8,11 +8,11 @@ namespace stellate {
 
 // A way down to F = 0, as far as it went.
 struct Descent {
-  Eigen::VectorXd point;           // d
-  Eigen::VectorXd value;           // m, F there; 0 where that goes without saying
-  Eigen::MatrixXd slopes;          // m x d, the Jacobian as far as it is known on the way
-  Eigen::VectorXd steepness;       // m, the lengths of its rows where it was last computed
-  double last_step = 0;            // its length
+  Eigen::VectorXd point;      // d
+  Eigen::VectorXd value;      // m, F there; 0 where that goes without saying
+  Eigen::MatrixXd slopes;     // m x d, the Jacobian as far as it is known on the way
+  Eigen::VectorXd steepness;  // m, the lengths of its rows where it was last computed
+  double last_step = 0;       // its length
   bool arrived = false;
 };
 
@@ -34,8 +34,8 @@ class EquationSystem {
   using Function = std::function<Eigen::VectorXd(const Eigen::VectorXd& x)>;
   using Jacobian = std::function<Eigen::MatrixXd(const Eigen::VectorXd& x)>;
 
-  // `equations`: m; `scale`: a length, of the solvers' steps and differences; `largest`: coordinate,
-  // whose rounding no step can go below. An empty `jacobian`: differences of f.
+  // `equations`: m; `scale`: a length, of the solvers' steps and differences; `largest`:
+  // coordinate, whose rounding no step can go below. An empty `jacobian`: differences of f.
   EquationSystem(Function f, Jacobian jacobian, int equations, double scale, double largest);
 
   // These equations and more: `jacobian` is of the others, and only called if this one has its own.
@@ -49,8 +49,8 @@ class EquationSystem {
   double seen_over() const { return jacobian_ ? 0 : difference_; }
 
   Eigen::VectorXd Values(const Eigen::VectorXd& x) const { return f_(x); }
-  // (m x r): the Jacobian along the columns of `ways` (d x r), as given or by central differences; by
-  // one-sided ones from the value at x, where that is there.
+  // (m x r): the Jacobian along the columns of `ways` (d x r), as given or by central differences;
+  // by one-sided ones from the value at x, where that is there.
   Eigen::MatrixXd Slopes(const Eigen::VectorXd& x, const Eigen::MatrixXd& ways,
                          const Eigen::VectorXd* value = nullptr) const;
   Eigen::MatrixXd SlopesAt(const Eigen::VectorXd& x) const;  // m x d, along all coordinates
@@ -60,8 +60,8 @@ class EquationSystem {
                         const Eigen::MatrixXd& ways, const Eigen::MatrixXd& slopes,
                         double seen_over) const;
 
-  // Drives F to zero from `start`; steps are halved until |F| falls. Jacobians are expensive, so that
-  // steps share them: each corrects the last by what it has seen (Broyden).
+  // Drives F to zero from `start`; steps are halved until |F| falls. Jacobians are expensive, so
+  // that steps share them: each corrects the last by what it has seen (Broyden).
   Descent Drive(const Eigen::VectorXd& start, const Beginning& beginning = {}) const;
 
  private:
@@ -80,8 +80,8 @@ Eigen::VectorXd NormalStep(const Eigen::MatrixXd& jacobian, const Eigen::VectorX
 Eigen::MatrixXd NullSpace(const Eigen::MatrixXd& matrix);
 
 // The point of {F = 0} nearest to x, or nothing where none is found: the nearest where x is nearer
-// to the set than its reach, a local minimum of the distance otherwise. `start`: where the way to it
-// begins.
+// to the set than its reach, a local minimum of the distance otherwise. `start`: where the way to
+// it begins.
 std::optional<Eigen::VectorXd> NearestZero(const EquationSystem& system, const Eigen::VectorXd& x,
                                            const Eigen::VectorXd& start);
 

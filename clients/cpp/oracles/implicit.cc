@@ -70,9 +70,9 @@ ImplicitOracle::ImplicitOracle(int dimension, int ambient_dimension, Function f,
   exactness_ = std::make_shared<const Exactness>("f", box_);
   const double largest =
       std::max(box_.lower.lpNorm<Eigen::Infinity>(), box_.upper.lpNorm<Eigen::Infinity>());
-  system_ = std::make_shared<const EquationSystem>(
-      Shaped(f_, equations()), Shaped(jacobian_, equations()), equations(),
-      (box_.upper - box_.lower).norm(), largest);
+  system_ = std::make_shared<const EquationSystem>(Shaped(f_, equations()),
+                                                   Shaped(jacobian_, equations()), equations(),
+                                                   (box_.upper - box_.lower).norm(), largest);
 }
 
 Answer ImplicitOracle::IntersectFlat(const MatrixXd& centers, const MatrixXd& bases,

@@ -12,26 +12,26 @@ namespace {
 
 using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
 
-constexpr double kClose = 1e-4;  // of |F| at x, from where steps go down and along at once
+constexpr double kClose = 1e-4;    // of |F| at x, from where steps go down and along at once
 constexpr double kCoarse = 1e-11;  // a tolerance, of the box: differences are not that exact
 // Of these steps each is shorter than the last by that factor.
 constexpr int kWalked = 10;
 constexpr double kContracts = 0.5, kExpected = 0.1;  // and what the second of them is taken to be
 constexpr double kLeast = 0.01;                      // of the distance's Hessian where they begin
-constexpr double kLeft = 1, kNoise = 1e4;           // tolerances: left in the end; that may grow
+constexpr double kLeft = 1, kNoise = 1e4;            // tolerances: left in the end; that may grow
 constexpr double kTold = 0.1;  // of a step along M, by which it has to go across to tell of that
 // In shares of the box: how far x is from M where its Jacobian is of no use; a step after which the
-// next may be the last, and one after which bends are others; and, squared, a distance times the step
-// of one-sided differences, which turn normals so long by more than is left in the end.
+// next may be the last, and one after which bends are others; and, squared, a distance times the
+// step of one-sided differences, which turn normals so long by more than is left in the end.
 constexpr double kRemote = 1e-3, kLate = 1e-4, kBent = 1e-3, kTurns = 3e-11;
 
 constexpr double kLeastBend = 0.1;  // of the distance's Hessian, below which no step is long enough
-constexpr double kLongestAlong = 0.1;    // step along M, in shares of the box
-constexpr double kArrived = 1e-9;   // likewise; and the step squares what error is left
-constexpr int kHalvings = 10;       // of a step along M: where all are too long there is a crease
-constexpr int kLanding = 20;        // steps down to M from a step along it
-// Ten steps along M, from the sixth on, have to become shorter by a factor of 0.7 or come nearer by a
-// thousandth: what is slower, as at creases, does not arrive. Steps that grow leave a saddle.
+constexpr double kLongestAlong = 0.1;  // step along M, in shares of the box
+constexpr double kArrived = 1e-9;      // likewise; and the step squares what error is left
+constexpr int kHalvings = 10;  // of a step along M: where all are too long there is a crease
+constexpr int kLanding = 20;   // steps down to M from a step along it
+// Ten steps along M, from the sixth on, have to become shorter by a factor of 0.7 or come nearer by
+// a thousandth: what is slower, as at creases, does not arrive. Steps that grow leave a saddle.
 constexpr int kFrom = 5, kPatience = 10;
 constexpr double kShorter = 0.7, kNearer = 1e-3, kGrown = 1.2;
 
@@ -76,7 +76,8 @@ class Walk {
   void Measure(bool first) {
     const double scale = system_.scale();
     ways_ = NullSpace(now_.slopes);
-    // Of several equations all slopes matter to multipliers, and those so far were seen far from here.
+    // Of several equations all slopes matter to multipliers, and those so far were seen far from
+    // here.
     if (first && now_.value.size() > 1 && distance() > kRemote * scale) {
       const Index d = x_.size();
       now_.slopes = system_.Slopes(now_.point, MatrixXd::Identity(d, d), &now_.value);
@@ -117,7 +118,8 @@ class Walk {
     const double length = step_.norm(), tolerance = system_.tolerance();
     if (first) {
       const Eigen::SelfAdjointEigenSolver<MatrixXd> solver(hessian, Eigen::EigenvaluesOnly);
-      if (!(solver.eigenvalues()[0] >= kLeast && length <= kLongestAlong * system_.scale())) return false;
+      if (!(solver.eigenvalues()[0] >= kLeast && length <= kLongestAlong * system_.scale()))
+        return false;
     } else if (!(length <= std::max(kContracts * last_, kNoise * tolerance))) {
       return false;
     }
@@ -162,7 +164,8 @@ class Walk {
   const VectorXd& x_;
   Descent now_;
   double last_;  // length of a step
-  MatrixXd ways_, frame_, framed_, bends_;  // along M; that the first bends are of, they, and of now
+  MatrixXd ways_, frame_, framed_,
+      bends_;  // along M; that the first bends are of, they, and of now
   VectorXd along_, step_;
   bool is_sure_ = false, ends_ = false;
 };

@@ -58,12 +58,9 @@ void CheckFace(const Walls& face, int walls) {
 
 // Nearest points of M = {F = 0} where the level's functions are zero, too: equations of one system.
 Answer OntoBoth(const EquationSystem& whole, const Level& level, int count, const MatrixXd& x) {
-  if (x.rows() < whole.equations() + count) {
-    Refuse(std::to_string(count) + " equations on a manifold of dimension " +
-           std::to_string(x.rows() - whole.equations()) + " leave none");
-  }
   const EquationSystem both = whole.With(level.f, level.slopes, count);
   Answer answer{x, std::vector<std::uint8_t>(static_cast<size_t>(x.cols()), 0), {}, {}};
+  if (both.equations() > x.rows()) return answer;  // they leave nothing
   for (Index j = 0; j < x.cols(); ++j) {
     const VectorXd at = x.col(j);
     std::optional<VectorXd> nearest = NearestZero(both, at, at);
@@ -271,7 +268,8 @@ std::shared_ptr<Oracle> Clipped::DividedBy(const VectorXd& scale) const {
   }
   MatrixXd seeds = seeds_;
   if (seeds.size() > 0) seeds.array().colwise() /= scale.array();
-  return std::make_shared<Clipped>(std::move(base), std::move(walls), std::move(seeds), labels_);
+  return std::make_shared<Clipped>(std::move(base), std::move(walls), std::move(seeds), labels_,
+                                   closures_);
 }
 
 Solid::Solid(std::vector<Wall> walls, BoundingBox around, MatrixXd seeds,

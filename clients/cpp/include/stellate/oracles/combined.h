@@ -111,6 +111,7 @@ class InUnits final : public Oracle {
     return scaled_->Conormals(points, face);
   }
   std::vector<std::uint8_t> labels() const override { return scaled_->labels(); }
+  std::vector<Walls> closures() const override { return scaled_->closures(); }
   std::vector<std::string> region_names() const override { return own_->region_names(); }
   std::optional<BoundingBox> bounding_box() const override { return scaled_->bounding_box(); }
   Eigen::MatrixXd seeds() const override { return scaled_->seeds(); }
