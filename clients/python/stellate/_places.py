@@ -10,7 +10,6 @@ import numpy as np
 
 from ._mesh import Mesh
 from .errors import StellateError
-from .oracle import CheckedOracle
 from .report import Report
 
 _NUMBER = r"-?(?:\d+\.?\d*(?:e[+-]?\d+)?)"
@@ -28,7 +27,7 @@ class Places:
         server says, in x."""
         given = getattr(oracle, "coordinates", None)
         self._coordinates: Callable[[Any], Any] | None = given if callable(given) else None
-        scale = np.array(CheckedOracle(oracle).coordinate_scale)
+        scale = np.array(getattr(oracle, "coordinate_scale", ()), dtype=float)
         if asked and len(scale):
             plain = self._coordinates
             self._coordinates = lambda y: y * scale if plain is None else plain(y * scale)
