@@ -184,7 +184,7 @@ void Scheduler<K>::Plan() {
   if (is_lost ||
       noticed_.stall.IsHopeless(violations.size_and_shape().size(), engine_.stars().size()) ||
       noticed_.stall.HasStalled(violations.size_and_shape().size() + violations.violating(),
-                                !violations.are_all_dirty(), boundary.stage() == K))
+                                !violations.are_all_dirty(), boundary.is_last_stage()))
     return LeaveFaces();
   creases_.Watch(engine_);
   *targets = engine_.Select(*targets);

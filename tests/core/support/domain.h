@@ -13,7 +13,7 @@
 
 #include "core/closures.h"
 #include "core/mesher.h"
-#include "stellate/implicit.h"
+#include "tests/core/support/plain_equations.h"
 
 namespace stellate::testing {
 
@@ -200,7 +200,7 @@ class Domain {
       }
       return j;
     };
-    return *(solver = std::make_shared<ImplicitOracle>(d - count, d, value, jacobian, box));
+    return *(solver = std::make_shared<PlainEquations>(d - count, d, value, jacobian, box));
   }
 
   std::map<core::WallSet, std::shared_ptr<Oracle>> solvers_;
