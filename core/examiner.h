@@ -76,6 +76,7 @@ struct OracleFault {
     kNotFinite,    // an answer is not finite
     kInexact,      // it computes in less than double precision
     kTouchesZero,  // an equation touches zero without passing through it
+    kDerivative,   // derivatives that it was given are not those of its function
   };
   Kind kind = Kind::kRaised;
   std::string what;  // its words

@@ -26,6 +26,8 @@ const char* CodeOf(OracleFault::Kind kind) {
       return "INEXACT";
     case OracleFault::Kind::kTouchesZero:
       return "TOUCHES_ZERO";
+    case OracleFault::Kind::kDerivative:
+      return "WRONG_DERIVATIVE";
     case OracleFault::Kind::kRaised:
       break;
   }

@@ -70,6 +70,7 @@ constexpr Words kWords[] = {
     {"TOUCHES_ZERO", Severity::kError, "{what}",
      "Solvers find where a function passes through zero: take what is squared, or a signed "
      "distance."},
+    {"WRONG_DERIVATIVE", Severity::kError, "{what}", "Correct the derivatives, or leave them out."},
     {"NOT_CLOSEST", Severity::kError,
      "the closest point to {query} is said to be {answer}, at distance {own}, but {other}, an "
      "answer too, is nearer: {seen}",

@@ -17,6 +17,7 @@ OracleFault::Kind KindOf(const MeshFailure& failure) {
   if (reason == "ORACLE_NOT_FINITE") return OracleFault::Kind::kNotFinite;
   if (reason == "ORACLE_PRECISION") return OracleFault::Kind::kInexact;
   if (reason == "ORACLE_TOUCHES_ZERO") return OracleFault::Kind::kTouchesZero;
+  if (reason == "ORACLE_DERIVATIVE") return OracleFault::Kind::kDerivative;
   return OracleFault::Kind::kRaised;
 }
 

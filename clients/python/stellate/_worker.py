@@ -35,7 +35,7 @@ _MESSAGE_BYTES = 4000
 _LOOK_AGAIN_SECONDS = 0.1
 _KINDS = (pb.QUERY_KIND_CLOSEST_POINT, pb.QUERY_KIND_INTERSECT_FLAT)
 # Of OracleFailure: what our own checks of an answer say; all others are about its shape.
-_TOLD_APART = ("ORACLE_NOT_FINITE", "ORACLE_PRECISION", "ORACLE_TOUCHES_ZERO")
+_TOLD_APART = ("ORACLE_NOT_FINITE", "ORACLE_PRECISION", "ORACLE_TOUCHES_ZERO", "ORACLE_DERIVATIVE")
 _SHAPE = "ORACLE_SHAPE"
 _BUSY_SHARE = 0.25  # of the time that the server bears silence
 
@@ -270,9 +270,11 @@ class Worker:
                 outbox.begin(response.queries.lease)
                 try:
                     reply = self._ask(self._oracle, response.queries)
-                except (KeyboardInterrupt, ExecutorError):
+                except ExecutorError:
                     raise  # no failure of the oracle: another worker may go on
                 except BaseException as error:
+                    if isinstance(error, KeyboardInterrupt) and self._may_be_told_to_leave():
+                        raise
                     self._on_failure(error)
                     self._tell(outbox, inbox, response.queries.lease, error)
                     raise
@@ -285,6 +287,11 @@ class Worker:
                 state = enums.state_of(response.over.state)
                 outbox.end()
         return state
+
+    def _may_be_told_to_leave(self) -> bool:
+        """Whether a KeyboardInterrupt may be Ctrl-C: that is for the main thread, or for processes of an
+        executor, and takes this worker away alone. In another thread the oracle itself has raised it."""
+        return threading.current_thread() is threading.main_thread() or self._ask is not answer
 
     def _how_it_ended(self) -> str:
         """Of a mesh that takes no more workers; "" if that cannot be found out."""

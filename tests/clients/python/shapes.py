@@ -44,8 +44,8 @@ def torus(columns: int = 12, rows: int = 7) -> stellate.Mesh:
     return stellate.Mesh(points, triangles[np.lexsort(triangles.T[::-1])])
 
 
-def equation(f):
+def equation(f, jacobian=None):
     """A surface in a cube, by one equation."""
     return stellate.ImplicitManifold(
-        f, ambient_dimension=3, dimension=2, bounding_box=([-1.4] * 3, [1.4] * 3)
+        f, jacobian, ambient_dimension=3, dimension=2, bounding_box=([-1.4] * 3, [1.4] * 3)
     )

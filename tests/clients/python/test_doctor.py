@@ -208,6 +208,7 @@ BROKEN = {
     "SIZE_WRONG": Torus(local_size=lambda p: np.where(p[:, 0] > 0, 0.4, -0.4)),
     "SIZE_CHANGES": Torus(local_size=lambda p: 0.4 + 0.001 / np.full(len(p), len(p))),
     "TOUCHES_ZERO": equation(lambda x: ((x * x).sum(axis=1) - 1) ** 2),
+    "WRONG_DERIVATIVE": equation(lambda x: (x * x).sum(axis=1) - 1, lambda x: -2 * x),
     "SINGULAR": equation(
         lambda x: (x * x).sum(axis=1) ** 2 - x[:, 0] ** 2 + x[:, 1] ** 2 + x[:, 2] ** 2
     ),

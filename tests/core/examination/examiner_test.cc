@@ -385,7 +385,8 @@ TEST(Examiner, EndsWithTheFaultOfAnOracle) {
   for (const auto& [kind, code] :
        {std::pair(Kind::kRaised, "RAISED"), std::pair(Kind::kShape, "WRONG_SHAPE"),
         std::pair(Kind::kNotFinite, "NOT_FINITE"), std::pair(Kind::kInexact, "INEXACT"),
-        std::pair(Kind::kTouchesZero, "TOUCHES_ZERO")}) {
+        std::pair(Kind::kTouchesZero, "TOUCHES_ZERO"),
+        std::pair(Kind::kDerivative, "WRONG_DERIVATIVE")}) {
     const auto examiner = core::Examiner::Create(testing::ExaminationOf(*torus), std::nullopt);
     examiner->Fail({kind, "on purpose"});
     EXPECT_EQ(examiner->NextBatch(), nullptr);

@@ -178,6 +178,8 @@ const Fault kFaults[] = {
                    v1::ServeOracleRequest* r) { SayItFailed(q, "ORACLE_PRECISION", r); }},
     {"TOUCHES_ZERO", [](const v1::QueryChunk& q,
                         v1::ServeOracleRequest* r) { SayItFailed(q, "ORACLE_TOUCHES_ZERO", r); }},
+    {"WRONG_DERIVATIVE", [](const v1::QueryChunk& q,
+                            v1::ServeOracleRequest* r) { SayItFailed(q, "ORACLE_DERIVATIVE", r); }},
 };
 
 class LiveFaultyExamineTest : public LiveExamineTest,

@@ -12,13 +12,10 @@ from .._derivatives import Library, with_derivatives
 from .._equations import Equations, System, Together, solve
 from .._rows import apply, norms, transposed
 from ..errors import InvalidArgument, NotConverged, OracleError
-from ._nearest import Nearest, normal_step, null_space
+from ._nearest import Nearest, null_space
 from ._units import Before, SlopeBefore
+from ._zeros import Doubts
 
-_LOOKS = 64  # points that F is looked at from where none leads to M
-_FEW = 0.25  # of the first batch, fewer of which find M where something is wrong with F
-_ZERO = 1e-6  # of what F is usually, where solvers that find no zero come to one
-_FLAT = 1e-2  # of how steep F is usually, where it is flat
 # Of where M's tangents were last asked for, that M is looked at for an end; and of the box, how far around.
 _LATELY, _BESIDE = 256, 1e-5
 
@@ -92,7 +89,7 @@ class ImplicitManifold:
         self.seeds = seeds
         self.local_size = local_size
         self.thread_safe = thread_safe
-        self._max_iterations, self._looked = max_iterations, False
+        self._max_iterations = max_iterations
         self._clipped: Any = None  # this manifold within its inequalities
         self._lately = np.empty((0, ambient_dimension))  # where tangents were last asked for
         self._scale = float(np.linalg.norm(upper - lower))
@@ -103,6 +100,7 @@ class ImplicitManifold:
         box = lower, upper
         self._equations = Equations(f, jacobian, shape, self._scale, box, max_iterations, seeds)
         self._nearest = Nearest(self._equations)
+        self._doubts = Doubts(self._equations, lower, upper)
         if len(inequalities) > 0:
             self._bound(inequalities, library)
 
@@ -212,61 +210,10 @@ class ImplicitManifold:
     # Pieces.
 
     def _all_or_raise(self, y: np.ndarray, converged: np.ndarray) -> np.ndarray:
-        if len(y) and not self._looked:
-            if converged.mean() < _FEW or self._keeps_a_sign(y[converged][:1]).any():
-                self._insist_on_a_change_of_sign()
-            self._looked = True
+        self._doubts.consider(y, converged)
         if not converged.all():
             raise NotConverged(y, converged)
         return y
-
-    def _keeps_a_sign(self, zeros: np.ndarray) -> np.ndarray:
-        """(1, d) or (0, d) -> which of F's values have one sign around there, none without a point."""
-        random = np.random.default_rng(2)
-        away = 1e-3 * self._scale * random.standard_normal((_LOOKS, self.ambient_dimension))
-        signs = np.sign(
-            self._equations.values((zeros[:, None, :] + away).reshape(-1, away.shape[1]))
-        )
-        kept = (signs >= 0).all(axis=0) | (signs <= 0).all(axis=0)
-        return kept & (len(signs) > 0)
-
-    def _insist_on_a_change_of_sign(self) -> None:
-        """Raises: OracleError where F comes down to zero from wherever it begins, and is flat there."""
-        lower, upper = self.bounding_box
-        random = np.random.default_rng(1)
-        starts = lower + random.random((_LOOKS, self.ambient_dimension)) * (upper - lower)
-        before = np.abs(self._equations.values(starts))
-        if not np.isfinite(before).all(axis=1).any():
-            raise OracleError(
-                f"f is not finite at any of {_LOOKS} places of its box, nor of its seeds: at "
-                f"{starts[0].tolist()} it is {self._equations.values(starts[:1])[0].tolist()}. Is the box "
-                "where f is defined, and in its unit?",
-                "ORACLE_NOT_FINITE",
-            )
-        y, values = self._equations.drive(starts, normal_step)[:2]
-        usable = np.isfinite(values).all(axis=1)
-        least = np.abs(values) <= _ZERO * np.nanmedian(before, axis=0)
-        if not usable.any() or not least[usable].all(axis=1).mean() > 0.5:
-            return  # where F is zero is found, or it is zero nowhere
-        row = int(np.flatnonzero(usable & least.all(axis=1))[0])
-        kept = self._keeps_a_sign(y[row : row + 1])
-        for number, keeps in enumerate(kept):
-            if keeps:
-                which = "f" if len(kept) == 1 else f"f's value {number}"
-                raise OracleError(
-                    f"{which} touches zero without changing its sign, as near {y[row].tolist()}: |f| is "
-                    "least there, as a square is, or a distance without a sign, and its gradient is zero "
-                    "or has none. Give what is squared, or a signed distance",
-                    "ORACLE_TOUCHES_ZERO",
-                )
-        steep = [np.abs(self._equations.jacobian(x)).max(axis=(1, 2)) for x in (starts, y)]
-        if not np.nanmedian(steep[1]) <= _FLAT * np.nanmedian(steep[0]):
-            return
-        raise OracleError(
-            f"f is flat where it is zero, as near {y[row].tolist()}: its gradient vanishes with it, as a "
-            "cube's does. Give what is raised to a power",
-            "ORACLE_TOUCHES_ZERO",
-        )
 
     def _meet_flats(self, start: np.ndarray, bases: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """By Newton's method from points of the flats, within them."""
