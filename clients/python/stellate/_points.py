@@ -111,7 +111,7 @@ def _array(values: Any, name: str, axes: int, shape: str) -> np.ndarray:
     if array.ndim != axes:
         raise InvalidArgument(f"{name} have {array.ndim} axes, and need {axes}: {shape}")
     array = np.ascontiguousarray(array, dtype=np.float64)
-    bad = ~np.isfinite(array).reshape(len(array), -1).all(axis=1)
+    bad = ~np.isfinite(array).all(axis=tuple(range(1, axes)))
     if bad.any():
         row = int(np.flatnonzero(bad)[0])
         raise InvalidArgument(

@@ -21,6 +21,7 @@ def checked(points, dimension=1, tangents=None, noise="auto", reach=None, drop=0
         ([[0, 1], [2, 3], [4]], "row 2 has 1 and row 0 has 2"),
         ([0, 1, 2], "have 1 axes, and need 2"),
         (np.zeros((3, 2, 2)), "have 3 axes"),
+        (np.zeros((0, 3)), "points is 0 but"),
         ([["a", "b"]], "have to be numbers"),
         (np.ma.masked_array([[0, 1], [2, 3]], [[0, 0], [0, 1]]), "row 1 of points"),
     ],

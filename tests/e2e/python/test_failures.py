@@ -79,6 +79,18 @@ def test_an_exception_reaches_the_caller_as_itself(method, workers, server, clie
     assert caught.value is thrown
 
 
+@pytest.mark.parametrize("kind", [KeyboardInterrupt, SystemExit, GeneratorExit])
+def test_a_mesh_ends_at_once_whose_oracle_wants_the_program_to_end(kind, server, client):
+    """Not after the seconds that a worker is waited for."""
+
+    def leave(x):
+        raise kind("of the oracle's own")
+
+    with pytest.raises(kind):
+        stellate.mesh(Torus(closest_point=leave), 0.1, server=server, label="that leaves")
+    assert "that leaves" not in [info.label for info in client.list()]
+
+
 def test_the_server_hears_of_the_exception(server, client):
     def fail(x):
         raise RuntimeError("the sensor is off")
