@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string_view>
 
@@ -10,7 +11,9 @@ namespace stellate::server {
 // clients at 3 Mbit/s each stop a server for all clients (CVE-2023-33953). No call is open
 // meanwhile, so nothing that counts calls sees it. In such a gRPC, where it is a shared library,
 // this replaces three functions of its header parser by ones of the same name, which the program's
-// own come before; they count, and call gRPC's. Delete it when no such gRPC is supported any more.
+// own come before; they count, and call gRPC's. gRPC 1.56.2, as packaging/grpc/build makes it, has
+// an end of its own for strings; it is held to the same bounds, by the functions that it is patched
+// to call.
 //
 // Of clients, in every server of this process: a header block has at most kMostHeaderBytes on the
 // wire in kMostHeaderFrames frames, and its headers at most kMostMetadataBytes, also before the
@@ -21,6 +24,9 @@ inline constexpr std::uint32_t kMostHeaderFrames = 8;         // two hold as man
 
 // False: blocks of any length would be taken, as by this gRPC and the way the program was built.
 bool HeaderBlocksEnd();
+
+// Whether a block may go on after so much. Counts it where it may not.
+bool HeaderBlockFits(std::size_t bytes, std::size_t frames);
 
 // How many connections were closed for it since the process began.
 std::uint64_t EndlessHeaderBlocks();

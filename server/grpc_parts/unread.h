@@ -13,10 +13,11 @@ namespace stellate::server {
 // as it comes and reaches the server when it is whole: a stranger who leaves out the last byte of
 // 300 messages of 4 MB has 1.2 GB kept, with no token asked for. gRPC's own ResourceQuota does not
 // help: asked for 64 MB, version 1.51 held 1 to 2 GB, and ended honest calls and connections.
-// Here it is counted, by functions of gRPC 1.51 that are replaced as header_bound.h says. The
-// connection guard closes connections before all of them hold `most`. Where they come to hold more
-// before it has looked, the one that adds to it is closed: unless it holds less than `most_of_one`,
-// and the less of that the more all hold, down to a few calls at one and a half times `most`.
+// Here it is counted, by functions of gRPC 1.51 that are replaced as header_bound.h says, or by
+// those that packaging/grpc/parts.patch has a later gRPC call. The connection guard closes
+// connections before all of them hold `most`. Where they come to hold more before it has looked,
+// the one that adds to it is closed: unless it holds less than `most_of_one`, and the less of that
+// the more all hold, down to a few calls at one and a half times `most`.
 struct UnreadOfAll {
   const std::int64_t most = 0;
   const std::int64_t most_of_one = 0;
@@ -66,12 +67,10 @@ inline constexpr std::int64_t kLetGoBytes = 64 << 10;  // of a connection, ever
 // Counts for the connection, from before gRPC gets it.
 std::shared_ptr<ConnectionUnread> CountUnread(int fd, std::shared_ptr<UnreadRules> rules);
 
+// Null: it is not counted.
+std::shared_ptr<ConnectionUnread> UnreadOf(int fd);
+
 // False: it cannot be counted with this gRPC and the way the program was built.
 bool CountsUnread();
-
-// For header_bound.cc: the call that this thread has begun since it last asked, or null; and that
-// its headers have come, as a grpc_metadata_batch.
-const void* TakeCallBegun();
-void HeadersHaveCome(const void* call, void* metadata);
 
 }  // namespace stellate::server
