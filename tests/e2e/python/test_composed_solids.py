@@ -285,3 +285,50 @@ def test_a_ball_with_a_shallow_cut(server):
     (rim,) = mesh.edges
     on = mesh.points[np.unique(rim.simplices)]
     assert np.abs(norm(on[:, :2], axis=1) - np.sin(np.radians(12))).max() < 1e-9
+
+
+BLOCK = s.Box([-1] * 3, [1] * 3)
+TOUCHING = {
+    "a hole along a face": (BLOCK - s.Cylinder(0.5, at=(0.5, 0, 0)), (3, 6)),
+    "the same, turned": (
+        (BLOCK - s.Cylinder(0.5, at=(0.5, 0, 0))).rotated(s.rotation((1, 2, 3), 0.7)),
+        (3, 6),
+    ),
+    "two holes": (
+        BLOCK - s.Cylinder(0.3, at=(0.3, 0, 0)) - s.Cylinder(0.3, at=(-0.3, 0, 0)),
+        (6, 7),
+    ),
+    "a bar on a plate": (
+        s.Box([-1, -1, -0.2], [1, 1, 0]) | s.Cylinder(0.3, 1, axis="x", at=(0, 0, 0.3)),
+        (5, 6),
+    ),
+    "two balls": (s.Ball() | s.Ball(at=(2, 0, 0)), (0, 1)),
+}
+
+
+@pytest.mark.parametrize("name", TOUCHING)
+def test_walls_that_touch_are_named_before_they_are_meshed_for_ever(name, server):
+    solid, walls = TOUCHING[name]
+    words = f"walls {walls[0]} and {walls[1]} touch, near "
+    with pytest.raises(stellate.OracleError, match=words) as caught:
+        stellate.mesh(solid, 0.2, server=server, max_vertices=20_000)
+    text = str(caught.value).split("near [")[1].split("]")[0]
+    place = np.array([[float(c) for c in text.split(",")]])
+    values = [abs(float(np.ravel(wall(place))[0])) for wall in solid.label_table()[0]]
+    assert sorted(values)[1] < 1e-9  # two are zero there
+    assert not stellate.check(solid, server=server).ok
+
+
+@pytest.mark.parametrize(
+    "solid, volume_of_it",
+    [
+        (BLOCK | s.Cylinder(0.5, 1, at=(0.5, 0, 0)), 8),  # it touches from within
+        (BLOCK - s.Cylinder(0.5, at=(0.45, 0, 0)), 8 - 2 * np.pi * 0.25),
+        (s.Box([-1] * 3, [0, 0, 1]) | s.Box([0, 0, -1], [1, 1, 1]), 4),  # an edge of both
+        (s.Ball() | s.Ball(at=(2.05, 0, 0)), 8 * np.pi / 3),
+    ],
+    ids=["within", "nearly", "an edge", "apart"],
+)
+def test_walls_that_do_not_touch_where_it_matters_are_not_accused(solid, volume_of_it, server):
+    mesh = stellate.mesh(solid, 0.2, server=server)
+    assert mesh.certified and mesh.volume == pytest.approx(volume_of_it, rel=0.04)

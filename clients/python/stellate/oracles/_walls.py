@@ -17,6 +17,7 @@ from ..oracle import CheckedOracle
 from ._combined import LevelSet
 from ._common import all_or_raise, refuse_walls, where_of
 from ._implicit import ImplicitManifold, OnWalls
+from ._touching import Touching
 from ._units import Before, SlopeBefore, in_units
 
 Wall = Callable[[Array], Any]
@@ -157,8 +158,12 @@ class Clipped:
         self.thread_safe = bool(getattr(oracle, "thread_safe", False))
         self.about = self._base.about
         self._faces: dict[tuple[int, ...], Callable[[Array], tuple[Array, Flags]]] = {}
-        box = where_of(self._base)
-        self._exactness = [Exactness(self._base.seeds, *box) for _ in self._walls]
+        lower, upper = where_of(self._base)
+        self._touching = Touching(
+            self._values, self._slopes, self._label_at, float(norms(upper - lower))
+        )
+        about = self._base.seeds
+        self._exactness = [Exactness(about, lower, upper) for _ in self._walls]
 
     def closest_point(self, points: Array) -> Array:
         """Of M, whatever the walls say."""
@@ -172,11 +177,20 @@ class Clipped:
         solver = self._faces.get(face)
         if solver is None:
             solver = self._faces[face] = self._solver_of(self._independent(face))
-        return all_or_raise(*solver(np.asarray(points, dtype=np.float64)))
+        x = np.asarray(points, dtype=np.float64)
+        y, found = solver(x)
+        if isinstance(self._oracle, Space):
+            if found.any():
+                self._touching.note_crossing(face)
+            self._touching.insist_they_cross(x[~found], face, self.walls)
+        return all_or_raise(y, found)
 
     def clearances(self, points: Array) -> Array:
         """(n, d) -> (n, walls): the walls' values."""
-        return self._values(tuple(range(self.walls)), points)
+        values = self._values(tuple(range(self.walls)), points)
+        if isinstance(self._oracle, Space):
+            self._touching.look(np.asarray(points, dtype=np.float64), values)
+        return values
 
     def conormals(self, points: Array, face: tuple[int, ...]) -> Array:
         """(n, d) -> (n, len(face), d): outward unit normals of the walls within M."""
@@ -213,6 +227,12 @@ class Clipped:
                 lambda like: [_WallEquation(self._value, self._gradients, w, like) for w in face],
             ).find
         return _Face(self._oracle, partial(self._values, face), partial(self._slopes, face)).find
+
+    def _label_at(self, signs: Flags) -> Any:
+        """(n, walls) -> (n,): the labels of sign vectors, 0 outside."""
+        if self.labels is None:
+            return signs.all(axis=1).astype(int)
+        return self.labels[signs @ (1 << np.arange(self.walls))]
 
     def _values(self, face: tuple[int, ...], points: Array) -> Array:
         """(n, d) -> (n, len(face))"""
