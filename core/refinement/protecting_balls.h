@@ -12,7 +12,7 @@ namespace stellate::core {
 inline constexpr double kLargestBall = 0.6;
 
 // Protecting balls of sharp edges, k = 3 (Cheng, Dey and Ramos). If two walls meet at less than
-// about 50 degrees, refining one encroaches on the other and back, without end. Therefore each
+// about 58 degrees, refining one encroaches on the other and back, without end. Therefore each
 // vertex of such an edge, and each corner at its ends, gets a ball in which no point is inserted.
 // Where the balls of neighbours overlap, no point outside is nearer to the edge than they are.
 //

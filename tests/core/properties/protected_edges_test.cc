@@ -12,6 +12,7 @@
 #include <numbers>
 #include <string>
 
+#include "core/base/message.h"
 #include "tests/core/support/domains.h"
 #include "tests/core/support/wall_mesh.h"
 
@@ -79,10 +80,10 @@ std::vector<Solid> Solids() {
     cell("its corner", {0, 0, 0}, epsilon, {1, 2, 0, 0});
     cell("its middle", {kPi, kPi, kPi}, epsilon, {1, 2, 0, 0});
   }
-  for (const double degrees : {55.0, 45.0, 35.0, 25.0, 20.0})
+  for (const double degrees : {55.0, 52.0, 50.5, 50.0, 45.0, 35.0, 25.0, 20.0})
     for (const double share : {0.4, 0.2}) {
       const double half = degrees * kPi / 360, up = std::cos(half);
-      solids.push_back({"lens of " + std::to_string(static_cast<int>(degrees)) + " degrees",
+      solids.push_back({"lens of " + Brief(degrees) + " degrees",
                         [degrees] { return stellate::testing::Lens(degrees); },
                         share * std::sin(half),
                         {1, 0, 0, 0},

@@ -202,8 +202,8 @@ TEST_P(ArrangementsTest, HaveTheLabelsOfTheirPlaces) {
     }
   if (arrangement.domain.k < arrangement.domain.d) return;
   for (const auto& [label, volume] : VolumesByCounting(arrangement))
-    EXPECT_NEAR(Volume(*mesh, mesh->regions.at(label)), volume, 0.12 * volume)
-        << label;  // chords of what is round
+    EXPECT_NEAR(Volume(*mesh, mesh->regions.at(label)), volume, 0.13 * volume)
+        << label;  // chords of what is round: an eighth of a ball whose radius is 2 epsilon
 }
 
 // Where a region touches itself alone, in the plane in two points and in space along a circle.
