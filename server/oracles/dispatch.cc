@@ -302,8 +302,8 @@ Dispatch::AcceptResult Dispatch::Accept(WorkerId worker_id, LeaseId id, TimePoin
     comparison.has_answer = comparison.has_answer || comparison.check == id;
   if (lease->check || lease->answered) return AcceptResult::kForComparison;
   const auto covers = [&](const Comparison& comparison) {
-    return comparison.block == lease->block && comparison.query >= lease->first &&
-           comparison.query < lease->first + lease->count;
+    return comparison.block == lease->block && comparison.first >= lease->first &&
+           comparison.first < lease->first + lease->count;
   };
   // The comparison of a slower worker is dropped: its answer does not count.
   std::erase_if(comparisons_,

@@ -49,7 +49,7 @@ struct DispatchPolicy {
   bool is_examination = false;
 
   // Share of a worker's queries that it is asked in addition, from another worker's chunks, to
-  // compare the answers; before the round ends, at least one of each family that it answers. 0:
+  // compare the answers; before the round ends, up to eight of each family that it answers. 0:
   // none.
   double check_share = 0.01;
 };
@@ -169,12 +169,12 @@ class Dispatch {
     bool Wants(Eigen::Index count) const { return max_chunk == 0 || count <= max_chunk; }
   };
 
-  // A comparison that the round still needs: ask another worker a query that `worker` has or had,
-  // since no answer of `worker` in that family has been compared yet.
+  // A comparison that the round still needs: ask another worker a few queries of a lease that
+  // `worker` has or had, since no answer of `worker` in that family has been compared yet.
   struct Comparison {
     WorkerId worker = 0;
     std::size_t block = 0;
-    Eigen::Index query = 0;
+    Eigen::Index first = 0, count = 0;
     bool answered = false;  // `worker` has answered it, and that answer counts
     LeaseId check = 0;      // the lease of `checker`; 0: not asked yet
     WorkerId checker = 0;
@@ -186,6 +186,7 @@ class Dispatch {
   void DropComparisons(WorkerId worker);
   bool IsCheckingFamily(WorkerId worker, const Family& family) const;
   std::optional<WorkerId> PickChecker(const Comparison& comparison) const;
+  Eigen::Index MostAtATime(const Worker& worker, std::size_t block, Eigen::Index count) const;
   Lease AskToCompare(Comparison* comparison, WorkerId checker, TimePoint now);
   // How long to wait for a comparison; nothing: do not wait.
   std::optional<TimePoint> ComparisonDeadline(const Comparison& comparison) const;

@@ -9,6 +9,10 @@ namespace {
 
 using Eigen::Index;
 
+// Queries of a worker's first comparison. Two walls, or two manifolds, are equally far from some
+// places, and one query can be such a place.
+constexpr Index kComparedAtFirst = 8;
+
 // Multiplicative hashing: a different place in each chunk, the same in each run.
 Index Scatter(LeaseId id, Index range) {
   return static_cast<Index>((id * 0x9e3779b97f4a7c15u >> 33) % static_cast<std::uint64_t>(range));
@@ -16,15 +20,20 @@ Index Scatter(LeaseId id, Index range) {
 
 }  // namespace
 
+// Of `count` queries, as many as the worker takes in one chunk.
+Index Dispatch::MostAtATime(const Worker& worker, std::size_t block, Index count) const {
+  if (!worker.Wants(count)) count = static_cast<Index>(worker.max_chunk);
+  const std::size_t bytes = std::max<std::size_t>(blocks_[block].bytes_per_query, 1);
+  return std::clamp<Index>(static_cast<Index>(options_.chunk_bytes / bytes), 1, count);
+}
+
 // Some queries of another worker's newest chunk, if it is time to ask `worker` any.
 std::optional<Lease> Dispatch::NextCheck(WorkerId id, Worker* worker) const {
   if (options_.check_share <= 0 || worker->check_credit < 1 || worker->Lagging()) return {};
   const auto& other = newest_ && newest_->worker != id ? newest_ : newest_other_;
   if (!other || other->worker == id) return {};
-  Index n = std::min(static_cast<Index>(worker->check_credit), other->count);
-  if (!worker->Wants(n)) n = static_cast<Index>(worker->max_chunk);
-  const std::size_t bytes = std::max<std::size_t>(blocks_[other->block].bytes_per_query, 1);
-  n = std::clamp<Index>(static_cast<Index>(options_.chunk_bytes / bytes), 1, n);
+  const Index n = MostAtATime(*worker, other->block,
+                              std::min(static_cast<Index>(worker->check_credit), other->count));
   Lease check;
   check.check = true;
   check.block = other->block;
@@ -46,7 +55,9 @@ void Dispatch::RequireComparison(const Lease& lease) {
         return comparison.worker == lease.worker && blocks_[comparison.block].family == family;
       });
   if (options_.check_share <= 0 || is_required || IsCompared(lease.worker, family)) return;
-  comparisons_.push_back({lease.worker, lease.block, lease.first + Scatter(lease.id, lease.count)});
+  const Index n = std::min(kComparedAtFirst, lease.count);
+  const Index first = lease.first + Scatter(lease.id, lease.count - n + 1);
+  comparisons_.push_back({lease.worker, lease.block, first, n});
 }
 
 // Its leases go to other workers, and so do the comparisons of them. Answers that it gave before
@@ -89,8 +100,8 @@ Lease Dispatch::AskToCompare(Comparison* comparison, WorkerId checker, TimePoint
   Lease check;
   check.check = true;
   check.block = comparison->block;
-  check.first = comparison->query;
-  check.count = 1;
+  check.first = comparison->first;
+  check.count = MostAtATime(workers_.at(checker), comparison->block, comparison->count);
   check = Give(checker, check, now);
   comparison->check = check.id;
   comparison->checker = checker;

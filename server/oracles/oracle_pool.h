@@ -140,6 +140,9 @@ class OraclePool {
   std::size_t workers() const { return worker_count_; }
   // All workers, the earliest first.
   std::vector<WorkerStats> ListWorkers() const;
+  // What to add where the mesher refuses answers that fit each other if one manifold gave them: how
+  // many workers gave them. "": one alone.
+  std::string WhoAnswered() const;
   // Queries of the round that have no answer yet.
   std::size_t waiting() const;
 

@@ -1,5 +1,8 @@
 #include "server/oracles/worker_stats.h"
 
+#include <algorithm>
+
+#include "core/base/message.h"
 #include "server/oracles/dispatch.h"
 #include "server/oracles/oracle_pool.h"
 
@@ -30,6 +33,16 @@ std::vector<WorkerStats> OraclePool::ListWorkers() const {
   std::vector<WorkerStats> workers = dispatch_.ListWorkers();
   for (WorkerStats& member : workers) member.display_name = display_names_.at(member.id);
   return workers;
+}
+
+std::string OraclePool::WhoAnswered() const {
+  const std::vector<WorkerStats> workers = ListWorkers();
+  const auto answered = std::count_if(workers.begin(), workers.end(),
+                                      [](const WorkerStats& worker) { return worker.queries > 0; });
+  if (answered < 2) return "";
+  return core::Message("; ", answered,
+                       " workers have answered: if each is right by itself, they serve different "
+                       "manifolds");
 }
 
 }  // namespace stellate::server

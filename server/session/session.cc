@@ -304,8 +304,10 @@ bool Session::Absorb(core::Mesher* mesher, const core::Answers& answers) {
     // What the round would have led to nobody has seen; a suspended mesh goes on from its answers.
     if (delta.error().code == StatusCode::kCancelled)
       mesher->Cancel();
-    else
+    else {
+      delta.error().message += WhoContradicts(delta.error());
       Fail(mesher, ToMeshFailure(delta.error()), delta.error());
+    }
     return false;
   }
   unseen_ = std::move(*delta);
@@ -344,6 +346,15 @@ void Session::Orient() {
   }
 }
 
+// Returns what to add to the mesher's refusal of an answer that contradicts another. Workers are
+// compared in some of their answers only, so the other may be another worker's; "" if not.
+std::string Session::WhoContradicts(const core::Status& refusal) const {
+  const bool contradicts = refusal.code == StatusCode::kOracleBadConormal ||
+                           refusal.code == StatusCode::kOracleBadSize ||
+                           refusal.code == StatusCode::kOracleNotIdempotent;
+  return contradicts ? pool_.WhoAnswered() : "";
+}
+
 // The mesh fails, but not by an answer of the workers that serve it now.
 void Session::FailBlameless(core::Mesher* mesher, MeshFailure failure) {
   core::Status status{StatusCode::kOracleFailed, failure.message};
@@ -377,6 +388,9 @@ Session::Ending Session::ChooseEnd(const core::Report* report) {
   if (report != nullptr) ending.report = *report;
   if (ending.report.termination == core::Termination::kOracleFailed &&
       failure_.reason == FailureReason::kNone) {
+    const std::string who = WhoContradicts(ending.report.failure);
+    ending.report.failure.message += who;
+    ending.report.certificate.verdict += who;
     failure_ = ToMeshFailure(ending.report.failure);
   }
   const auto& record = options_.record;

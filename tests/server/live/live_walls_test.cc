@@ -100,6 +100,8 @@ TEST_F(LiveWallsTest, WorkersThatAgreeMakeACertifiedMesh) {
 
 // Each offset is more than the answers to one question may be apart. All questions are asked twice:
 // one to which both walls are equally near tells nothing, and which it is depends on who is quick.
+// Where it tells nothing, a wall's own answers may contradict each other, and the refusal says
+// whose they are.
 TEST_F(LiveWallsTest, AWallAtTwoPlacesIsFound) {
   Config config;
   config.check_share = 1;
@@ -107,10 +109,11 @@ TEST_F(LiveWallsTest, AWallAtTwoPlacesIsFound) {
   for (const double offset : {0.02, 0.05, 0.1, 0.2, 0.5}) {
     for (const double sign : {-1.0, 1.0}) {
       const v1::Mesh mesh = MeshBy({0.1}, {0.1 + sign * offset * kEpsilon});
-      EXPECT_EQ(mesh.report().failure().reason(), "WORKERS_DISAGREE")
+      const std::string& message = mesh.report().failure().message();
+      EXPECT_TRUE(mesh.report().failure().reason() == "WORKERS_DISAGREE" ||
+                  message.find("they serve different manifolds") != std::string::npos)
           << sign * offset << " epsilon: " << mesh.report().ShortDebugString();
-      EXPECT_NE(mesh.report().failure().message().find("wall 0"), std::string::npos)
-          << mesh.report().failure().message();
+      EXPECT_NE(message.find("wall 0"), std::string::npos) << message;
     }
   }
 }

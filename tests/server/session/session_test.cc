@@ -24,6 +24,7 @@ class FakeMesher : public stellate::testing::StubMesher {
   struct Plan {
     int rounds = 3;
     core::Status absorb_error;        // not Ok: Absorb refuses
+    std::uint64_t error_after = 0;    // rounds
     bool throws = false;              // Absorb throws
     std::uint64_t revision_step = 1;  // 2: deltas that do not follow
     std::shared_future<void> gate;    // Absorb waits for it, or to be interrupted
@@ -48,7 +49,8 @@ class FakeMesher : public stellate::testing::StubMesher {
       if (interrupted_) return core::Refuse(core::StatusCode::kCancelled, "interrupted");
     }
     if (plan_.throws) throw std::runtime_error("boom");
-    if (!plan_.absorb_error.ok()) return tl::unexpected(plan_.absorb_error);
+    if (!plan_.absorb_error.ok() && progress_.round >= plan_.error_after)
+      return tl::unexpected(plan_.absorb_error);
     ++progress_.round;
     progress_.fraction = 0.5;
     progress_.is_foreseeable = plan_.foreseeable;
@@ -153,6 +155,27 @@ TEST(Session, AnswersThatTheMesherRefusesFailTheMeshAndBlameItsWorkers) {
   EXPECT_EQ(view.failure.message, "query 5 moves its own answer");
   worker->WaitForEnd();
   EXPECT_EQ(worker->end().blame.code, core::StatusCode::kOracleNotIdempotent);
+}
+
+// Answers that contradict each other may be two workers', of whom each is right.
+TEST(Session, ARefusalSaysIfSeveralWorkersAnswered) {
+  for (const bool are_two : {false, true}) {
+    FakeMesher::Plan plan;
+    plan.absorb_error = {core::StatusCode::kOracleBadConormal, "turned"};
+    plan.error_after = 1;
+    std::promise<void> gate;
+    plan.gate = gate.get_future().share();
+    Running running(Faking(plan));
+    const auto first = FakeWorker::Join(&running.session->pool());
+    const auto second = are_two ? FakeWorker::Join(&running.session->pool()) : nullptr;
+    gate.set_value();
+    const SessionView view = running.Finish();
+    EXPECT_EQ(view.failure.reason, FailureReason::kOracleBadConormal);
+    EXPECT_EQ(view.failure.message,
+              are_two ? "turned; 2 workers have answered: if each is right by itself, they serve "
+                        "different manifolds"
+                      : "turned");
+  }
 }
 
 TEST(Session, AFaultOfTheMesherFailsOnlyItsMesh) {
