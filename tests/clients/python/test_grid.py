@@ -187,3 +187,11 @@ def test_numbers_in_single_precision_are_data_like_others():
     values = ball()
     single = OfGrid(values.astype(np.float32), box_of(values))
     assert np.abs(radii(single) - radii(OfGrid(values, box_of(values)))).max() < 1e-5
+
+
+@pytest.mark.parametrize("shape", [(1, 8, 8), (8, 8, 8, 1)])
+def test_an_axis_of_one_value_is_told(shape):
+    with pytest.raises(
+        stellate.InvalidArgument, match=r"an axis of one value is none: squeeze\(\)"
+    ):
+        oracles.SignedDistance.of_volume(np.zeros(shape))

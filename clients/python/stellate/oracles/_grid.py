@@ -63,6 +63,15 @@ class Grid:
             raise InvalidArgument(f"values on a grid have to be real numbers, not {array.dtype}")
         self.values = np.asarray(array, dtype=np.float64)
         d = array.ndim
+        if min(array.shape, default=0) < 4:
+            single = (
+                "; an axis of one value is none: squeeze() leaves it out"
+                if 1 in array.shape
+                else ""
+            )
+            raise InvalidArgument(
+                f"a cubic spline needs 4 values an axis, and has {array.shape}{single}"
+            )
         try:
             lower, upper = (np.asarray(corner, dtype=np.float64) for corner in bounding_box)
         except (TypeError, ValueError):
@@ -71,8 +80,6 @@ class Grid:
             raise InvalidArgument(
                 f"values on a grid of {d} axes need a box of R^{d}, lower < upper"
             )
-        if min(array.shape) < 4:
-            raise InvalidArgument(f"a cubic spline needs 4 values an axis, and has {array.shape}")
         insist_on_values(self.values)
         self.lower, self.upper = lower, upper
         self.spacing = (upper - lower) / (np.array(array.shape) - 1)
