@@ -53,6 +53,7 @@ class Assembler {
     done(0.5);
     if (K >= 3 && IsWorthMore()) Begin(BuildAll(all, CentreRule::kTangentSpace));
     done(0.7);
+    DropStrays();
     if (IsWorthMore()) Weigh();
     done(0.85);
     int round = 0;
@@ -181,6 +182,25 @@ class Assembler {
       kept[p] = weights[p];
     if (std::any_of(kept.begin(), kept.end(), [](double w) { return w > 0; }))
       result_.weights = std::move(kept);
+    FindHopeful();
+  }
+
+  // Drops points far from all others, which no simplex has: the mesh is whole without them, where
+  // no cavity is near.
+  void DropStrays() {
+    std::vector<std::uint8_t> used(cloud_.size);
+    for (const std::uint32_t p : result_.simplices) used[p] = 1;
+    std::vector<std::uint32_t> cavities;
+    for (const std::uint32_t p : left_)
+      if (used[p]) cavities.push_back(p);
+    for (std::uint32_t p = 0; p < own_ && dropped_ < request_.most_dropped; ++p) {
+      CheckInterruption(p);
+      if (used[p] || result_.radii[p] <= OpenRadius(cloud_, p)) continue;
+      if (IsNear(p, cavities, kChanged * spacing_)) continue;
+      result_.places[p] = Place::kDropped;
+      ++dropped_;
+    }
+    std::erase_if(left_, [&](std::uint32_t p) { return result_.places[p] == Place::kDropped; });
     FindHopeful();
   }
 

@@ -23,6 +23,11 @@ constexpr double kCoordinateError = 1e-15;
 constexpr double kMostlyRight = 0.5;
 constexpr double kSomeOther = 0.1;
 
+// Of EDGE, where a boundary is allowed already.
+constexpr const char* kEdgeOfOpen =
+    "the points end here, or have a hole, and do not show along which line: add points, or trim "
+    "the mesh";
+
 Specification SpecificationOf(const ReconstructionSpecification& spec, bool has_boundary) {
   Specification result;
   result.dimension = spec.dimension;
@@ -41,7 +46,7 @@ std::string NamePlace(const MeshView& mesh, const KnownOfPoints& known, std::uin
 }
 
 // "at 12 of 1000 points (EDGE 10, NOISE 2), the first is point 17, (0.5, 1, 0): ..."
-std::string DescribeCauses(const MeshView& mesh, const KnownOfPoints& known) {
+std::string DescribeCauses(const MeshView& mesh, const KnownOfPoints& known, bool closed) {
   std::uint64_t counts[kPlaces] = {};
   std::optional<std::uint32_t> first;
   for (std::uint32_t p = 0; p < known.causes.size(); ++p) {
@@ -56,7 +61,8 @@ std::string DescribeCauses(const MeshView& mesh, const KnownOfPoints& known) {
                       counts[place]);
   const Place cause = known.causes[*first];
   return Message("at ", known.against, " of ", mesh.vertices, " points (", list, "); the first is ",
-                 NamePlace(mesh, known, *first), ": ", PlaceName(cause), ", ", PlaceAdvice(cause));
+                 NamePlace(mesh, known, *first), ": ", PlaceName(cause), ", ",
+                 cause == Place::kEdge && !closed ? kEdgeOfOpen : PlaceAdvice(cause));
 }
 
 class Judge {
@@ -178,7 +184,7 @@ class Judge {
   }
 
   std::string Causes() const {
-    std::string causes = DescribeCauses(mesh_, known_);
+    std::string causes = DescribeCauses(mesh_, known_, spec_.closed);
     if (spec_.weights != Weighting::kOnly || counts_.unfilled_vertices == 0) return causes;
     return Message(causes, ". No weights were found by which all stars agree, and at ",
                    counts_.unfilled_vertices,

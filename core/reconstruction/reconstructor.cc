@@ -12,6 +12,7 @@
 #include "core/base/message.h"
 #include "core/base/parallel.h"
 #include "core/base/parallel_sort.h"
+#include "core/index/indexed_points.h"
 #include "core/reconstruction/assembly.h"
 #include "core/reconstruction/causes.h"
 #include "core/reconstruction/difference_tangents.h"
@@ -25,6 +26,8 @@ namespace {
 
 // The share of the time that each phase ends at.
 constexpr double kIndexedBy = 0.03, kFittedBy = 0.4, kAssembledBy = 0.85;
+// What coordinates are rounded to, as a share of the largest, and at most of how far points extend.
+constexpr double kMerging = 1e-12, kMostMerging = 1e-9;
 // Points for which weights are tried that may make a mesh provable: a minute or two.
 constexpr std::size_t kMostExuded = 100'000;
 
@@ -33,6 +36,39 @@ struct Distinct {
   std::vector<std::uint32_t> rows;  // ascending
   std::vector<std::pair<std::uint32_t, std::uint32_t>> merged;
 };
+
+// Merges those that differ by rounding alone, as the first and the last of a closed curve, and all
+// of a sphere's pole.
+void MergeRounded(const Eigen::MatrixXd& points, Distinct* distinct) {
+  const double largest = points.cwiseAbs().maxCoeff();
+  const double extent = (points.rowwise().maxCoeff() - points.rowwise().minCoeff()).maxCoeff();
+  const double radius = std::min(kMerging * largest, kMostMerging * extent);
+  const std::vector<std::uint32_t>& rows = distinct->rows;
+  IndexedPoints tree(static_cast<int>(points.rows()));
+  for (const std::uint32_t row : rows) tree.AddUnindexed(points.col(row).data());
+  tree.Index();
+  std::vector<std::uint32_t> first(rows.size());
+  ParallelFor(rows.size(), [&](std::uint32_t p) {
+    first[p] = p;
+    tree.tree().VisitNear(
+        points.col(rows[p]).data(), [&] { return radius; },
+        [&](std::uint32_t q, double) { first[p] = std::min(first[p], q); });
+  });
+  std::vector<std::uint32_t> kept;
+  for (std::size_t p = 0; p < rows.size(); ++p) {
+    first[p] = first[first[p]];  // of a chain the first of all
+    if (first[p] == p)
+      kept.push_back(rows[p]);
+    else
+      distinct->merged.emplace_back(rows[p], rows[first[p]]);
+  }
+  if (kept.size() == rows.size()) return;
+  for (auto& [row, stands] : distinct->merged) {
+    const auto at = std::lower_bound(rows.begin(), rows.end(), stands) - rows.begin();
+    stands = rows[first[static_cast<std::size_t>(at)]];
+  }
+  distinct->rows = std::move(kept);
+}
 
 Distinct FindDistinct(const Eigen::MatrixXd& points) {
   const Eigen::Index d = points.rows();
@@ -57,6 +93,7 @@ Distinct FindDistinct(const Eigen::MatrixXd& points) {
       distinct.rows.push_back(order[i]);
   }
   ParallelSort(distinct.rows, std::less<>());
+  MergeRounded(points, &distinct);
   ParallelSort(distinct.merged, std::less<>());
   return distinct;
 }

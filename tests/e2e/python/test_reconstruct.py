@@ -101,6 +101,45 @@ def test_noise_moves_copies_and_no_point(server, rng):
     assert np.median(off(mesh.smoothed)) < 0.6 * np.median(off(noisy))
 
 
+def test_points_that_are_equal_up_to_rounding_are_merged(server):
+    """A closed curve whose last point is its first, as linspace makes it, and the poles of a sphere."""
+    angles = np.linspace(0, 2 * np.pi, 500)
+    circle = np.stack([np.cos(angles), np.sin(angles)], axis=1)
+    assert 0 < np.abs(circle[0] - circle[-1]).max() < 1e-15
+    mesh = stellate.reconstruct(circle, 1, server=server)
+    assert mesh.certified and mesh.places.tolist().count("MERGED") == 1
+    assert mesh.places[-1] == "MERGED"
+    far = stellate.reconstruct(100 * circle + [5e5, 4e6], 1, server=server)
+    assert far.certified and far.places[-1] == "MERGED"
+    shaken = circle + 1e-15 * np.random.default_rng(1).standard_normal(circle.shape)
+    thrice = stellate.reconstruct(np.concatenate([circle, shaken, circle]), 1, server=server)
+    assert thrice.certified and thrice.places.tolist().count("MERGED") == 1001
+
+
+def even_sphere(n):
+    i = np.arange(n) + 0.5
+    z = 1 - 2 * i / n
+    along, radius = np.pi * (1 + 5**0.5) * i, np.sqrt(1 - z * z)
+    return np.stack([radius * np.cos(along), radius * np.sin(along), z], axis=1)
+
+
+def test_a_stray_point_is_left_out_as_far_as_points_may_be(server):
+    stray = np.concatenate([even_sphere(2000), [[3.0, 3.0, 3.0]]])
+    mesh = stellate.reconstruct(stray, 2, server=server)
+    assert mesh.certified and mesh.places.tolist().count("DROPPED") == 1
+    assert mesh.places[-1] == "DROPPED" and mesh.betti() == (1, 0, 1)
+    kept = stellate.reconstruct(stray, 2, drop=0, server=server)
+    assert not kept.certified and kept.places[-1] == "EDGE"
+
+
+def test_a_boundary_that_is_allowed_is_not_advised(server):
+    sphere = even_sphere(2000)
+    for closed in (True, False):
+        mesh = stellate.reconstruct(sphere[sphere[:, 2] > 0], 2, closed=closed, server=server)
+        assert not mesh.certified
+        assert ("allow a boundary" in mesh.report.certificate.verdict) == closed
+
+
 def test_equal_points_are_merged(server, torus):
     points = np.concatenate([torus, torus[:3]])
     mesh = stellate.reconstruct(points, 2, server=server)
