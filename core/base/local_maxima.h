@@ -3,6 +3,7 @@
 #include <atomic>
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "core/base/parallel.h"
@@ -19,18 +20,40 @@ namespace stellate::core {
 template <typename VisitStronger>
 class LocalMaxima {
  public:
-  LocalMaxima(std::size_t count, const VisitStronger& visit_stronger)
+  // elsewhere: by thing, whether it is decided elsewhere (see Take). Empty: none is.
+  LocalMaxima(std::size_t count, const VisitStronger& visit_stronger,
+              std::vector<std::uint8_t> elsewhere = {})
       : count_(count),
         visit_stronger_(visit_stronger),
-        state_(std::make_unique<std::atomic<State>[]>(count)) {
-    std::vector<std::size_t> open = LeftOpen(count, [](std::size_t i) { return i; });
-    for (int pass = 1; pass < kMostPasses && !open.empty(); ++pass)
-      open = LeftOpen(open.size(), [&](std::size_t at) { return open[at]; });
-    for (std::size_t at = 0; at < open.size(); ++at) {
-      CheckInterruption(at);
-      Follow(open[at]);
+        state_(std::make_unique<std::atomic<State>[]>(count)),
+        elsewhere_(std::move(elsewhere)) {}
+
+  // Decides what waits for nothing that is still to be taken, or much of it. Returns how many are
+  // left, of those decided here: none if all are.
+  std::size_t DecideOwn() {
+    if (!has_begun_)
+      open_ = LeftOpen(count_, [](std::size_t i) { return i; });
+    else
+      open_ = LeftOpen(open_.size(), [&](std::size_t at) { return open_[at]; });
+    has_begun_ = true;
+    for (int pass = 1; pass < kMostPasses && !open_.empty(); ++pass) {
+      const std::size_t before = open_.size();
+      open_ = LeftOpen(before, [&](std::size_t at) { return open_[at]; });
+      if (open_.size() == before) return before;  // all of them wait for others
     }
+    if (!elsewhere_.empty()) return open_.size();
+    for (std::size_t at = 0; at < open_.size(); ++at) {
+      CheckInterruption(at);
+      Follow(open_[at]);
+    }
+    open_.clear();
+    return 0;
   }
+
+  // What was decided elsewhere.
+  void Take(std::size_t i, bool is_chosen) { Set(i, is_chosen ? kChosen : kRefused); }
+  bool IsOpen(std::size_t i) const { return Get(i) == kOpen; }
+  bool IsChosen(std::size_t i) const { return Get(i) == kChosen; }
 
   std::vector<std::uint8_t> Chosen() const {
     std::vector<std::uint8_t> chosen(count_);
@@ -68,15 +91,18 @@ class LocalMaxima {
   std::vector<std::size_t> LeftOpen(std::size_t count, const At& at) {
     return ParallelGather<std::size_t>(count, [&](std::size_t i, std::vector<std::size_t>* left) {
       std::size_t held_up_by = 0;
-      if (!Decide(at(i), &held_up_by)) left->push_back(at(i));
+      const std::size_t thing = at(i);
+      if (!IsElsewhere(thing) && !Decide(thing, &held_up_by)) left->push_back(thing);
     });
   }
+
+  bool IsElsewhere(std::size_t i) const { return !elsewhere_.empty() && elsewhere_[i] != 0; }
 
   void Follow(std::size_t i) {
     std::vector<std::size_t> waiting = {i};
     while (!waiting.empty()) {
       std::size_t held_up_by = 0;
-      if (Get(waiting.back()) != kOpen || Decide(waiting.back(), &held_up_by))
+      if (!IsOpen(waiting.back()) || Decide(waiting.back(), &held_up_by))
         waiting.pop_back();
       else
         waiting.push_back(held_up_by);
@@ -86,13 +112,18 @@ class LocalMaxima {
   std::size_t count_;
   const VisitStronger& visit_stronger_;
   std::unique_ptr<std::atomic<State>[]> state_;
+  const std::vector<std::uint8_t> elsewhere_;
+  std::vector<std::size_t> open_;  // once it has begun
+  bool has_begun_ = false;
 };
 
 // Returns 1 for each thing that is chosen, else 0.
 template <typename VisitStronger>
 std::vector<std::uint8_t> ChooseLocalMaxima(std::size_t count,
                                             const VisitStronger& visit_stronger) {
-  return LocalMaxima<VisitStronger>(count, visit_stronger).Chosen();
+  LocalMaxima<VisitStronger> choice(count, visit_stronger);
+  choice.DecideOwn();
+  return choice.Chosen();
 }
 
 }  // namespace stellate::core

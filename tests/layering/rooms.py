@@ -55,7 +55,9 @@ CORE = {
     "core/boundary": (*_GROUND, "core/complex"),
     "core/rules": (*_GROUND, "core/complex", "core/boundary"),
     "core/refinement": (*_GROUND, "core/complex", "core/boundary", "core/rules"),
-    "core/sampling": (*_GROUND, "core/refinement"),
+    # What parts of one mesh tell each other.
+    "core/parts": ("core/base",),
+    "core/sampling": (*_GROUND, "core/refinement", "core/parts"),
     "core/speculation": (*_GROUND, "core/complex", "core/refinement", "core/sampling"),
     "core/run": (
         *_GROUND,

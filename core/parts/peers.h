@@ -1,0 +1,39 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+namespace stellate::core {
+
+// The parts that make one mesh together, each with a share of space, in one process or in many.
+// All functions wait for the other parts: all parts make the same calls in the same order.
+class Peers {
+ public:
+  using Bytes = std::vector<std::byte>;
+
+  virtual ~Peers() = default;
+
+  // From 0 to parts() - 1.
+  virtual int part() const = 0;
+  virtual int parts() const = 0;
+
+  // Sends each part its bytes, by part. Returns those that each has sent to this one, by part.
+  virtual std::vector<Bytes> Exchange(std::vector<Bytes> bytes) const = 0;
+  // Returns the sum over all parts, and over those before this one.
+  struct Sums {
+    std::uint64_t all, before;
+  };
+  virtual Sums Sum(std::uint64_t count) const = 0;
+};
+
+// The only part, of a whole mesh.
+class Alone final : public Peers {
+ public:
+  int part() const override { return 0; }
+  int parts() const override { return 1; }
+  std::vector<Bytes> Exchange(std::vector<Bytes> bytes) const override { return bytes; }
+  Sums Sum(std::uint64_t count) const override { return {count, 0}; }
+};
+
+}  // namespace stellate::core
