@@ -7,18 +7,16 @@
 #include <utility>
 
 #include "core/base/dense.h"
-#include "core/base/local_maxima.h"
 #include "core/base/parallel.h"
 #include "core/base/parallel_copy.h"
 #include "core/base/parallel_select.h"
 #include "core/index/near_lists.h"
+#include "core/parts/choice.h"
 #include "core/sampling/lattice.h"
 
 namespace stellate::core {
 namespace {
 
-// An answer farther than this many spacings from its query is no neighbour: M bends away.
-constexpr double kFarthestAnswer = 1;
 // Tangent spaces that keep less of a frame's volume than this have turned too far to carry it on.
 constexpr double kLeastVolume = 0.1;
 // Points of a run lie within this many spacings of its first: of higher dimension there are more of
@@ -64,9 +62,8 @@ void Growth<K>::Sites::Resize(std::size_t count, std::size_t stride, bool predic
 }
 
 template <int K>
-template <typename Column>
 void Growth<K>::Sites::Put(std::size_t at, const Sites& others,
-                           const std::vector<Column>& columns) {
+                           const std::vector<std::uint32_t>& columns) {
   const std::size_t stride = others.size() == 0 ? 0 : others.points.size() / others.size();
   const std::size_t change_stride = others.changes.empty() ? 0 : stride * (K + 1);
   ParallelFor(columns.size(), [&](std::size_t i) {
@@ -85,7 +82,7 @@ void Growth<K>::Sites::Put(std::size_t at, const Sites& others,
 
 template <int K>
 Growth<K>::Proposed::Proposed(std::size_t count, std::size_t stride, bool predicts)
-    : parents(count), clear(count) {
+    : parents(count), first(count), clear(count) {
   sites.Resize(count, stride, predicts);
 }
 
@@ -94,10 +91,11 @@ Growth<K>::Layer::Layer(int d, Numbers placed, Numbers its_shares, double reach)
     : points(std::move(placed)), shares(std::move(its_shares)), tree(points, d, reach, shares) {}
 
 template <int K>
-Growth<K>::Growth(int d, double spacing, bool predicts)
+Growth<K>::Growth(int d, double spacing, bool predicts, Territory territory)
     : d_(d),
       spacing_(spacing),
       predicts_(predicts),
+      territory_(std::move(territory)),
       vectors_(LatticeVectors(K)),
       longest_(spacing * LongestLatticeVector(K)) {
   for (double& x : vectors_) x *= spacing;
@@ -194,33 +192,56 @@ std::vector<std::uint8_t> Growth<K>::AreFree(const Candidates& candidates,
   return free;
 }
 
+template <int K>
+typename Growth<K>::Contenders Growth<K>::ContendersOf(const Candidates& candidates,
+                                                       const Proposed& proposed) const {
+  const std::vector<std::uint8_t> free = AreFree(candidates, proposed);
+  const std::vector<std::uint32_t> left =
+      ParallelSelect(free.size(), [&](std::size_t i) { return free[i] != 0; });
+  Contenders contenders{std::vector<std::uint32_t>(left.size()), std::vector<int>(left.size()),
+                        Numbers(left.size() * stride()), Numbers(left.size())};
+  ParallelFor(left.size(), [&](std::size_t i) {
+    contenders.columns[i] = candidates.columns[left[i]];
+    contenders.parents[i] = proposed.parents[contenders.columns[i]];
+    std::copy_n(candidates.points.data() + left[i] * stride(), d_,
+                contenders.points.data() + i * stride());
+    contenders.shares[i] = candidates.shares[left[i]];
+  });
+  return contenders;
+}
+
 // Chooses those of the candidates that keep their distance from the sample and from each other, and
-// returns their places, ascending. Proposals of more parents come first: they are more likely at
+// returns their columns, ascending. Proposals of more parents come first: they are more likely at
 // their place in the lattice.
 template <int K>
 std::vector<std::uint32_t> Growth<K>::Choose(const Candidates& candidates,
                                              const Proposed& proposed) const {
-  const std::size_t count = candidates.columns.size();
-  const std::vector<std::uint8_t> far = AreFree(candidates, proposed);
-  const NearLists near(candidates.points, d_, kKeep * spacing_, candidates.shares);
-  const auto strength = [&](std::uint32_t i) {
-    const std::uint32_t c = candidates.columns[i];
-    return std::pair(-static_cast<int>(proposed.parents[c]), i);
-  };
-  const std::vector<std::uint8_t> chosen =
-      ChooseLocalMaxima(count, [&](std::size_t i, const auto& visit) {
-        if (!far[i]) return;
+  Contenders all = ContendersOf(candidates, proposed);
+  const Borders borders = ShareContenders(proposed, &all);
+  const NearLists near(all.points, d_, kKeep * spacing_, all.shares);
+  const auto strength = [&](std::uint32_t i) { return std::pair(-all.parents[i], i); };
+  const std::vector<std::uint8_t> is_chosen = ChooseLocalMaxima(
+      territory_.peers(), borders, all.columns.size(), [&](std::size_t i, const auto& visit) {
         for (const std::uint32_t j : near.Of(i))
-          if (far[j] && strength(j) < strength(static_cast<std::uint32_t>(i)) && !visit(j)) return;
+          if (strength(j) < strength(static_cast<std::uint32_t>(i)) && !visit(j)) return;
       });
-  return ParallelSelect(count, [&](std::size_t i) { return chosen[i] && far[i]; });
+  std::vector<std::uint32_t> chosen = ParallelSelect(all.columns.size(), [&](std::size_t i) {
+    return is_chosen[i] && all.columns[i] != kNoColumn;
+  });
+  for (std::uint32_t& i : chosen) i = all.columns[i];
+  return chosen;
 }
 
 template <int K>
 typename Growth<K>::Ring Growth<K>::Propose() {
   const bool is_lost = answered_ > kTelling && static_cast<double>(unexpected_) >
                                                    kMostUnexpected * static_cast<double>(answered_);
-  asked_ = is_lost ? Proposed() : Merge(ByPlace(FreePlaces()));
+  asked_ = Proposed();
+  if (!is_lost) {
+    Proposed places = ByPlace(FreePlaces());
+    const Borders borders = SharePlaces(&places);
+    asked_ = Merge(std::move(places), borders);
+  }
   border_ = {};
   const Sites& sites = asked_.sites;
   const auto count = static_cast<Eigen::Index>(sites.size());
@@ -310,8 +331,9 @@ std::vector<Eigen::Index> Growth<K>::Begin(const Eigen::MatrixXd& points,
   }
   const std::span<const double> given(shares.data(), static_cast<std::size_t>(shares.size()));
   const Candidates candidates = CandidatesOf(points, given, std::move(answered));
-  const std::vector<std::uint8_t> far =
+  std::vector<std::uint8_t> far =
       AreFarFromPlaced(candidates.points, candidates.shares, clearance * spacing_);
+  ShareFar(candidates, &far);
   std::vector<double> begun;
   BallTree tree(d_, &begun);
   std::vector<std::size_t> seeds;
@@ -337,6 +359,7 @@ std::vector<Eigen::Index> Growth<K>::Begin(const Eigen::MatrixXd& points,
     sites.shares[at] = candidates.shares[i];
     sites.patch[at] = patches_++;
   }
+  KeepNear(&sites);
   Carry(std::move(sites));
   return columns;
 }
@@ -384,8 +407,7 @@ std::vector<Eigen::Index> Growth<K>::Join(const Eigen::MatrixXd& points,
   const Candidates candidates =
       CandidatesOf(points, asked_.sites.shares,
                    ParallelSelect(fits.size(), [&](std::size_t i) { return fits[i] == kFits; }));
-  std::vector<std::uint32_t> chosen = Choose(candidates, asked_);
-  for (std::uint32_t& i : chosen) i = candidates.columns[i];
+  const std::vector<std::uint32_t> chosen = Choose(candidates, asked_);
   Sites sites;
   sites.Resize(chosen.size(), stride(), predicts_);
   sites.Put(0, asked_.sites, chosen);
@@ -394,8 +416,11 @@ std::vector<Eigen::Index> Growth<K>::Join(const Eigen::MatrixXd& points,
     joined[i] = chosen[i];
     std::copy_n(points.col(joined[i]).data(), d_, sites.points.data() + i * stride());
   });
+  std::vector<OrderKey> keys;
+  if (!territory_.is_whole())
+    for (const std::uint32_t c : chosen) keys.push_back(asked_.KeyOf(c));
   asked_ = Proposed();
-  Carry(std::move(sites));
+  CarryToAll(keys, std::move(sites));
   return joined;
 }
 

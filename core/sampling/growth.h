@@ -11,6 +11,9 @@
 #include "core/base/unset.h"
 #include "core/index/ball_tree.h"
 #include "core/index/runs.h"
+#include "core/parts/numbers.h"
+#include "core/parts/parcel.h"
+#include "core/parts/territory.h"
 #include "core/sampling/lattice.h"
 
 namespace stellate::core {
@@ -27,14 +30,18 @@ namespace stellate::core {
 // by it. An answer whose share differs from the expected one does not join; if that is so of most
 // answers, Propose returns nothing more.
 //
+// Parts of one sample each grow what lies in their territory, and know what lies around it: all
+// call the same functions, with the same seeds, and each gets its own rings. Their points, put
+// together, are those of the whole, the same bit for bit: of one size everywhere, with tangents.
+//
 // Deterministic: the same for any number of threads. Pure geometry, without queries.
 template <int K>
 class Growth {
  public:
   // d        ambient dimension
   // spacing  nearest-neighbour distance of the lattice, length; the largest where it is graded
-  // predicts whether rings say how far M is expected to have bent away from them
-  Growth(int d, double spacing, bool predicts = false);
+  // predicts whether rings say how far M is expected to have bent away from them: the whole only
+  Growth(int d, double spacing, bool predicts = false, Territory territory = {});
 
   // Makes seeds of those points of M, d x n with tangent bases (K rows of d) x n, that are found,
   // farther than `clearance` lattice spacings from all points so far, and `apart` spacings (times
@@ -65,6 +72,7 @@ class Growth {
   // Frees its memory. Propose returns nothing afterwards.
   void Forget();
 
+  // Returns the number of points so far: of a part, of those that it knows.
   std::uint32_t size() const { return size_; }
   // Returns the number of points that joined last.
   std::size_t border() const { return border_.size(); }
@@ -78,6 +86,10 @@ class Growth {
 
  private:
   using Numbers = UnsetVector<double>;
+  // Proposals nearer to each other than this many spacings are one.
+  static constexpr double kMerged = 0.5;
+  // An answer farther than this many spacings from its query is no neighbour: M bends away.
+  static constexpr double kFarthestAnswer = 1;
   // Places of the lattice: points that joined, or that are proposed.
   struct Sites {
     Numbers points;  // d each
@@ -99,8 +111,10 @@ class Growth {
       shares[at] = 0;
     }
     // Writes some sites of others, `columns`, from place `at` on.
-    template <typename Column>
-    void Put(std::size_t at, const Sites& others, const std::vector<Column>& columns);
+    void Put(std::size_t at, const Sites& others, const std::vector<std::uint32_t>& columns);
+    // As messages between parts, of one size everywhere.
+    void PackTo(Peers::Bytes* message, const std::vector<std::uint32_t>& columns) const;
+    void UnpackAt(std::size_t at, std::size_t count, std::size_t stride, Parcel* parcel);
   };
   // The means of proposals for one site.
   struct Proposed {
@@ -108,7 +122,9 @@ class Growth {
     explicit Proposed(std::size_t count = 0, std::size_t stride = 0, bool predicts = false);
     Sites sites;
     UnsetVector<std::uint16_t> parents;  // how many proposed it
+    UnsetVector<std::uint32_t> first;    // the first of them, in the whole border
     Numbers clear;                       // no point is nearer than this, length
+    OrderKey KeyOf(std::size_t i) const { return {sites.patch[i], sites.name[i], first[i]}; }
   };
   // The points of some rounds; layers of about the same size are merged.
   struct Layer {
@@ -141,7 +157,7 @@ class Growth {
   void ProposeFrom(std::uint32_t p, const Placed& near, std::vector<Proposal>* free) const;
   std::vector<Proposal> FreePlaces() const;
   Proposed ByPlace(std::vector<Proposal> proposals) const;
-  Proposed Merge(Proposed places) const;
+  Proposed Merge(Proposed places, const Borders& borders) const;
   // Answers to proposals.
   struct Candidates {
     std::vector<std::uint32_t> columns;  // their proposals, ascending
@@ -151,7 +167,22 @@ class Growth {
   Candidates CandidatesOf(const Eigen::MatrixXd& points, std::span<const double> shares,
                           std::vector<std::uint32_t> columns) const;
   std::vector<std::uint8_t> AreFree(const Candidates& candidates, const Proposed& proposed) const;
+  // Candidates that are far from the sample, in the order of their proposals.
+  struct Contenders {
+    std::vector<std::uint32_t> columns;  // of their proposals; of another part's, kNoColumn
+    std::vector<int> parents;            // of their proposals, how many
+    Numbers points, shares;              // as of candidates
+  };
+  static constexpr std::uint32_t kNoColumn = 0xffffffff;
+  Contenders ContendersOf(const Candidates& candidates, const Proposed& proposed) const;
   std::vector<std::uint32_t> Choose(const Candidates& candidates, const Proposed& proposed) const;
+  // What parts tell each other (growth_parts.cc): nothing, where there is one.
+  Borders SharePlaces(Proposed* places) const;
+  Borders ShareContenders(const Proposed& proposed, Contenders* contenders) const;
+  void ShareFar(const Candidates& candidates, std::vector<std::uint8_t>* far) const;
+  void KeepNear(Sites* sites);
+  void CarryToAll(const std::vector<OrderKey>& keys, Sites sites);
+  double Halo() const;
   enum Fit : std::uint8_t { kMisfit, kFits, kUnexpected };
   std::vector<Fit> FitAnswers(const Eigen::MatrixXd& points, const Eigen::MatrixXd& tangents,
                               const std::vector<std::uint8_t>& found,
@@ -162,6 +193,7 @@ class Growth {
   int d_;
   double spacing_;
   bool predicts_;
+  Territory territory_;
   std::vector<double> vectors_;  // of the lattice, length, K each
   double longest_;               // of them
   LatticeNames names_{K};
@@ -171,6 +203,8 @@ class Growth {
   std::uint32_t size_ = 0;
   std::uint32_t patches_ = 0;
   Sites border_;
+  // Of a part: the places of its border_ in that of the whole.
+  std::vector<std::uint32_t> border_numbers_;
   Proposed asked_;
 };
 

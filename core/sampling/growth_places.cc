@@ -5,11 +5,11 @@
 #include <cmath>
 
 #include "core/base/dense.h"
-#include "core/base/local_maxima.h"
 #include "core/base/parallel.h"
 #include "core/base/parallel_select.h"
 #include "core/base/parallel_sort.h"
 #include "core/index/near_lists.h"
+#include "core/parts/choice.h"
 #include "core/sampling/growth.h"
 
 namespace stellate::core {
@@ -22,8 +22,6 @@ constexpr double kLeastMoment = 0.05;
 // by this share of the change in a spacing, at most by half.
 constexpr double kSlopeMargin = 0.3;
 constexpr double kLeastStep = 0.5;
-// Proposals nearer to each other than this many spacings are one.
-constexpr double kMerged = 0.5;
 // Points are gathered this many spacings farther around a place than those that would take it: the
 // answer lies a little beside the place, and mostly needs no search then. Only near points decide
 // slopes.
@@ -191,18 +189,19 @@ typename Growth<K>::Proposed Growth<K>::ByPlace(std::vector<Proposal> proposals)
     places.sites.patch[place] = proposals[begin].patch;
     places.sites.name[place] = proposals[begin].name;
     places.parents[place] = static_cast<std::uint16_t>(end - begin);
+    places.first[place] = proposals[begin].parent;
   });
   return places;
 }
 
 // Merges places of one patch that coincide although their names differ. If two patches meet, only
-// one of them proposes.
+// one of them proposes. Of a part's places, what others lead is theirs.
 template <int K>
-typename Growth<K>::Proposed Growth<K>::Merge(Proposed places) const {
+typename Growth<K>::Proposed Growth<K>::Merge(Proposed places, const Borders& borders) const {
   const Sites& sites = places.sites;
   const NearLists near(sites.points, d_, kMerged * spacing_, sites.shares);
-  const std::vector<std::uint8_t> leads =
-      ChooseLocalMaxima(sites.size(), [&](std::size_t i, const auto& visit) {
+  const std::vector<std::uint8_t> leads = ChooseLocalMaxima(
+      territory_.peers(), borders, sites.size(), [&](std::size_t i, const auto& visit) {
         for (const std::uint32_t j : near.Of(i))
           if (j > i || !visit(j)) return;
       });
@@ -221,8 +220,10 @@ typename Growth<K>::Proposed Growth<K>::Merge(Proposed places) const {
       leader[i] = j;
     }
   });
-  const std::vector<std::uint32_t> leaders =
-      ParallelSelect(sites.size(), [&](std::size_t i) { return leads[i] != 0; });
+  const std::vector<std::uint32_t> leaders = ParallelSelect(sites.size(), [&](std::size_t i) {
+    return leads[i] &&
+           (territory_.is_whole() || territory_.Owns(sites.points.data() + i * stride()));
+  });
   if (leaders.size() == sites.size()) return places;
   Proposed merged(leaders.size(), stride(), predicts_);
   ParallelFor(leaders.size(), [&](std::size_t l) {
@@ -253,6 +254,7 @@ typename Growth<K>::Proposed Growth<K>::Merge(Proposed places) const {
       if (is_of(i)) add(i);
     merged.sites.patch[l] = sites.patch[lead];
     merged.sites.name[l] = sites.name[lead];
+    merged.first[l] = places.first[lead];
     merged.clear[l] =
         places.clear[lead] - Distance(point, sites.points.data() + lead * stride(), d_);
   });
@@ -265,7 +267,7 @@ typename Growth<K>::Proposed Growth<K>::Merge(Proposed places) const {
       const;                                                                                 \
   template std::vector<Growth<K>::Proposal> Growth<K>::FreePlaces() const;                   \
   template Growth<K>::Proposed Growth<K>::ByPlace(std::vector<Proposal>) const;              \
-  template Growth<K>::Proposed Growth<K>::Merge(Proposed) const;
+  template Growth<K>::Proposed Growth<K>::Merge(Proposed, const Borders&) const;
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
 #undef STELLATE_EACH
 
