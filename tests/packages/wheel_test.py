@@ -14,6 +14,9 @@ import zipfile
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 VERSION = (ROOT / "VERSION").read_text().strip()
+GRPC = subprocess.run(
+    [ROOT / "packaging" / "grpc" / "build", "--bill"], capture_output=True, text=True, check=True
+).stdout.split()[1]
 MESH = """
 import os, pathlib, subprocess, sys
 import google.protobuf, grpc
@@ -112,6 +115,12 @@ class Wheel(unittest.TestCase):
             zipfile.ZipFile(self.wheel).extractall(folder)
             bundled = folder / "stellate" / "_bundled"
             programs = [bundled / "stellated", bundled / "stellate"]
+            programs[0].chmod(0o755)  # pip does, zipfile does not
+            self.assertEqual(
+                run(programs[0], "--version"),
+                f"stellated {VERSION} (gRPC {GRPC})\n",
+                "of packaging/grpc/build",
+            )
             for file in [*programs, *(bundled / "lib").iterdir()]:
                 for library, path in re.findall(r"(\S+) => (\S+)", run("ldd", file)):
                     of_the_machine = re.match(r"lib(c|m|stdc\+\+|gcc_s)\.so", library)
@@ -120,7 +129,27 @@ class Wheel(unittest.TestCase):
             hardening = ROOT / "tests" / "packages" / "hardening_test.py"
             run("/usr/bin/python3", "-B", hardening, *programs)
             licences = {file.name for file in (bundled / "licences").iterdir()}
-            self.assertLessEqual({"stellate", "libgrpc29", "libssl3", "libtbb12"}, licences)
+            self.assertLessEqual({"stellate", "grpc", "libssl3", "libtbb12"}, licences)
+            self.assertFalse(list((bundled / "lib").glob("libgrpc*")), "Debian's, too")
+
+    def test_its_server_stands_what_is_known_against_its_grpc(self) -> None:
+        with tempfile.TemporaryDirectory() as folder:
+            zipfile.ZipFile(self.wheel).extractall(folder)
+            server = pathlib.Path(folder) / "stellate" / "_bundled" / "stellated"
+            server.chmod(0o755)
+            known = ROOT / "tests" / "container" / "advisories_test.py"
+            subprocess.run(
+                ["/usr/bin/python3", "-B", known, "Abort", "Poison"],
+                env={**os.environ, "STELLATED": str(server)}, check=True,
+            )  # fmt: skip
+
+    def test_its_grpc_reports_what_strangers_make_it_hold(self) -> None:
+        """As Debian's is made to, in the suite."""
+        with_tests = ["cmake", "--preset", "package", "-DSTELLATE_TESTS=ON", "--log-level=NOTICE"]
+        build = ["cmake", "--build", "--preset", "package", "--target", "server_grpc_parts_test"]
+        for command in (with_tests, build, [ROOT / "build/package/bin/server_grpc_parts_test"]):
+            done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+            self.assertEqual(done.returncode, 0, done.stdout[-3000:] + done.stderr[-3000:])
 
     def test_it_names_its_platform(self) -> None:
         self.assertRegex(
