@@ -73,6 +73,15 @@ Life FirstLife(const std::optional<SessionRecord>& record) {
   return was_cancelled ? Life::kReplayingCancelled : Life::kRepeating;
 }
 
+// Returns what to add to the mesher's refusal of an answer that contradicts another. Workers are
+// compared in some of their answers only, so the other may be another worker's; "" if not.
+std::string WhoContradicts(const OraclePool& pool, const core::Status& refusal) {
+  const bool contradicts = refusal.code == StatusCode::kOracleBadConormal ||
+                           refusal.code == StatusCode::kOracleBadSize ||
+                           refusal.code == StatusCode::kOracleNotIdempotent;
+  return contradicts ? pool.WhoAnswered() : "";
+}
+
 }  // namespace
 
 Clock::duration AgeOf(std::chrono::system_clock::time_point time) {
@@ -305,7 +314,7 @@ bool Session::Absorb(core::Mesher* mesher, const core::Answers& answers) {
     if (delta.error().code == StatusCode::kCancelled)
       mesher->Cancel();
     else {
-      delta.error().message += WhoContradicts(delta.error());
+      delta.error().message += WhoContradicts(pool_, delta.error());
       Fail(mesher, ToMeshFailure(delta.error()), delta.error());
     }
     return false;
@@ -346,15 +355,6 @@ void Session::Orient() {
   }
 }
 
-// Returns what to add to the mesher's refusal of an answer that contradicts another. Workers are
-// compared in some of their answers only, so the other may be another worker's; "" if not.
-std::string Session::WhoContradicts(const core::Status& refusal) const {
-  const bool contradicts = refusal.code == StatusCode::kOracleBadConormal ||
-                           refusal.code == StatusCode::kOracleBadSize ||
-                           refusal.code == StatusCode::kOracleNotIdempotent;
-  return contradicts ? pool_.WhoAnswered() : "";
-}
-
 // The mesh fails, but not by an answer of the workers that serve it now.
 void Session::FailBlameless(core::Mesher* mesher, MeshFailure failure) {
   core::Status status{StatusCode::kOracleFailed, failure.message};
@@ -388,7 +388,7 @@ Session::Ending Session::ChooseEnd(const core::Report* report) {
   if (report != nullptr) ending.report = *report;
   if (ending.report.termination == core::Termination::kOracleFailed &&
       failure_.reason == FailureReason::kNone) {
-    const std::string who = WhoContradicts(ending.report.failure);
+    const std::string who = WhoContradicts(pool_, ending.report.failure);
     ending.report.failure.message += who;
     ending.report.certificate.verdict += who;
     failure_ = ToMeshFailure(ending.report.failure);

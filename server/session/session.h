@@ -5,7 +5,6 @@
 #include <memory>
 #include <mutex>
 #include <optional>
-#include <string>
 
 #include "core/base/interruption.h"
 #include "core/mesher.h"
@@ -108,7 +107,6 @@ class Session {
   bool Absorb(core::Mesher* mesher, const core::Answers& answers);
   std::optional<MeshFailure> PublishRound(core::Mesher* mesher);
   void Orient();
-  std::string WhoContradicts(const core::Status& refusal) const;
   void FailBlameless(core::Mesher* mesher, MeshFailure failure);
   void Fail(core::Mesher* mesher, MeshFailure failure, core::Status status);
   SessionState FinalState(const core::Report* report) const;
