@@ -73,6 +73,12 @@ class BoundaryState {
   // within `same` are one. REQUIRES: it was found, on K walls.
   bool KeepCrowd(const AnsweredPoints& answers, Eigen::Index c, double same);
   const std::vector<Crowd>& crowds() const { return crowds_; }
+  // Keeps a corner that is all of M around it: walls meet there, and another that only touches them
+  // leaves nothing else inside. d coordinates each.
+  void NoteLonePoint(const Eigen::VectorXd& point) {
+    lone_points_.insert(lone_points_.end(), point.begin(), point.end());
+  }
+  const std::vector<double>& lone_points() const { return lone_points_; }
   std::vector<Crowd> TakeCrowds() { return std::exchange(crowds_, {}); }
 
   // The radius of the concentric shell around a corner, on which the first points of all its edges
@@ -113,7 +119,8 @@ class BoundaryState {
   std::vector<Split> splits_;
   std::vector<Crowd> crowds_;
   std::vector<Eigen::VectorXd> crowded_;  // where all that were kept are
-  Eigen::VectorXd largest_clearances_;    // by wall
+  std::vector<double> lone_points_;
+  Eigen::VectorXd largest_clearances_;  // by wall
   std::map<std::uint32_t, double> shells_;
 };
 

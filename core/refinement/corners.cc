@@ -205,7 +205,10 @@ std::optional<CrowdedCorner> Corners<K>::SettleCone(const Known& known) {
   if (!IsSubset(known.crowd.beyond, walls)) return std::nullopt;
   if (CountWalls(walls) > kMostAtCorner) return CrowdedCorner{known.crowd.point, walls};
   const CornerCone<K> cone = ConeOf<K>(walls, known.ConormalsOf(walls).data());
-  if (cone.rays.empty()) return std::nullopt;  // M has no more than that point there
+  if (cone.rays.empty()) {  // M has no more than that point there
+    engine_.boundary.NoteLonePoint(known.crowd.point);
+    return std::nullopt;
+  }
   if (!cone.is_simple) return CrowdedCorner{known.crowd.point, walls, cone.crowded};
   Insert(known, cone.walls, 0);
   return std::nullopt;

@@ -64,6 +64,8 @@ StarFacts FactsOf(Engine<K>& engine) {
   facts.converged = true;
   facts.protection = engine.protection().delta();
   facts.centre_rule = engine.criteria().centre_rule;
+  facts.lone_points = engine.boundary().lone_points();
+  facts.same_point = BoundaryState<K>::kSameCorner * engine.criteria().epsilon;
   const bool agreed = engine.filled().is_handed_out();
   const bool leaves_inside = engine.boundary().policy().LeavesInside();
   const bool has_labels = !stars.sample().sectors().labels().empty();

@@ -222,6 +222,7 @@ bool CoverageClaims::IsBeyondFacet(const Eigen::VectorXd& x, std::uint32_t verte
 
 void CoverageClaims::JudgeHits(const Probe& probe, const FibreHits& hits) {
   if (hits.count < 0) return;  // undecided by rounding
+  if (x_.IsLonePoint(probe.x.data())) return;
   if (hits.count == 0 && x_.mesh.walls && IsBeyondFacet(probe.x, probe.nearest.vertex)) return;
   ++x_.certificate.fibre_samples;
   const double size = x_.LocalSize(probe.nearest.vertex);
@@ -247,9 +248,17 @@ Evidence CoverageClaims::JudgeSeen() {
   const std::uint64_t vertices = x_.thorough() ? x_.mesh.vertices : kMaxVerticesCompared;
   Evidence evidence = CompareWithMesh(x_.mesh, x_.seen, x_.longest_edge, x_.size, x_.graded(),
                                       x_.position_error, vertices);
+  const auto at = [&](std::uint64_t i) {
+    return x_.seen.data() + i * static_cast<std::size_t>(x_.mesh.d);
+  };
+  if (std::erase_if(evidence.uncovered, [&](std::uint64_t i) { return x_.IsLonePoint(at(i)); }) > 0)
+    x_.findings.Warn(Message(
+        "The manifold has a point by itself, where a wall touches a corner of the others, at ",
+        NamePoint(Eigen::Map<const Eigen::VectorXd>(x_.facts.lone_points.data(), x_.mesh.d)),
+        ": the mesh does without it."));
   if (evidence.uncovered.empty()) return evidence;
   for (const std::uint64_t i : evidence.uncovered) {
-    const double* y = x_.seen.data() + i * static_cast<std::size_t>(x_.mesh.d);
+    const double* y = at(i);
     x_.wanted.insert(x_.wanted.end(), y, y + x_.mesh.d);
   }
   const Eigen::VectorXd first = Eigen::Map<const Eigen::VectorXd>(x_.wanted.data(), x_.mesh.d);

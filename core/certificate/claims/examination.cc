@@ -28,6 +28,13 @@ double Examination::DistanceAllowed(double circumradius) const {
   return kDistanceShare * std::min(circumradius, spec.epsilon) + kDistanceNoise * size;
 }
 
+bool Examination::IsLonePoint(const double* y) const {
+  const auto d = static_cast<std::size_t>(mesh.d);
+  for (std::size_t i = 0; i < facts.lone_points.size(); i += d)
+    if (Distance(facts.lone_points.data() + i, y, mesh.d) <= facts.same_point) return true;
+  return false;
+}
+
 void Examination::ReportPinched() {
   certificate.pinched_vertices = pinched.size();
   if (pinched.empty()) return;

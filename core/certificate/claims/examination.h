@@ -34,6 +34,8 @@ struct Examination {
   // How far M may be from the mesh at a vertex, and from a point of a simplex.
   double LocalSize(std::uint32_t v) const;
   double DistanceAllowed(double circumradius) const;
+  // Whether y (d) is a point that no mesh shows.
+  bool IsLonePoint(const double* y) const;
   // Writes Certificate::pinched_vertices, and a warning with the first place, from `pinched`.
   void ReportPinched();
   double Circumradius(const std::uint32_t* ids) const;

@@ -332,3 +332,19 @@ def test_walls_that_touch_are_named_before_they_are_meshed_for_ever(name, server
 def test_walls_that_do_not_touch_where_it_matters_are_not_accused(solid, volume_of_it, server):
     mesh = stellate.mesh(solid, 0.2, server=server)
     assert mesh.certified and mesh.volume == pytest.approx(volume_of_it, rel=0.04)
+
+
+def gyroid(x):
+    x, y, z = x.T
+    return np.sin(x) * np.cos(y) + np.sin(y) * np.cos(z) + np.sin(z) * np.cos(x)
+
+
+# In two of its corners such a cell has nothing of the solid around it but the corner, which rounding
+# finds inside or not.
+@pytest.mark.parametrize("low, angle", [(0.0, 0.0), (np.pi, 0.0), (0.0, 0.1)])
+def test_a_gyroid_in_a_cell_that_begins_at_its_corner(low, angle, server):
+    cell = s.Box([low] * 3, [low + 2 * np.pi] * 3) & s.Implicit(gyroid)
+    mesh = stellate.mesh(cell.rotated(s.rotation([0, 0, 1], angle)), 0.45, server=server)
+    hold(mesh, -1, 7)
+    assert volume(mesh) == pytest.approx(4 * np.pi**3, rel=0.02)
+    assert any("has a point by itself" in warning for warning in mesh.report.certificate.warnings)
