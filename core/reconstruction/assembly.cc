@@ -48,7 +48,8 @@ class Assembler {
   Assembly Run(FunctionRef<void(double)> done) {
     std::vector<std::uint32_t> all(cloud_.size);
     std::iota(all.begin(), all.end(), 0u);
-    if ((request_.exudes || request_.weights_only) && Exude(all, done)) return std::move(result_);
+    if ((request_.exudes || request_.weights_only) && Exude(all, 0, done))
+      return std::move(result_);
     Begin(BuildAll(all, K >= 3 ? CentreRule::kCommonCentre : CentreRule::kTangentSpace));
     done(0.5);
     if (K >= 3 && IsWorthMore()) Begin(BuildAll(all, CentreRule::kTangentSpace));
@@ -61,6 +62,8 @@ class Assembler {
     done(0.9);
     for (round = 0; round < kAddRounds && IsWorthMore() && Add();) ++round;
     RemoveVain();
+    if (request_.exudes_at_last && !left_.empty() && cloud_.size == own_ && Exude(all, 0.9, done))
+      return std::move(result_);
     done(1);
     MarkLeft();
     return std::move(result_);
@@ -72,9 +75,10 @@ class Assembler {
   }
 
   // Takes the stars of weighted points if all agree, or if there is to be nothing else. Returns
-  // whether it did.
-  bool Exude(const std::vector<std::uint32_t>& all, FunctionRef<void(double)> done) {
-    ExudingWeights found = FindExudingWeights<K>(cloud_, [&](double share) { done(0.5 * share); });
+  // whether it did. `from`: the share of the work that is done before.
+  bool Exude(const std::vector<std::uint32_t>& all, double from, FunctionRef<void(double)> done) {
+    ExudingWeights found =
+        FindExudingWeights<K>(cloud_, [&](double share) { done(from + 0.5 * (1 - from) * share); });
     if (!found.agree && !request_.weights_only) return false;
     TiledStars stars = BuildTiledStars<K>(cloud_, {.ids = all,
                                                    .weights = &found.weights,

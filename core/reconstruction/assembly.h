@@ -27,6 +27,8 @@ struct AssemblyRequest {
   // Weights of all points come first, by which stars in tangent spaces agree and have few slivers;
   // what they do not settle is assembled as ever.
   bool exudes = false;
+  // The same, but last: only where something is left, and only if they settle all.
+  bool exudes_at_last = false;
   // Nothing but these weights: the mesh is what the stars agree on.
   bool weights_only = false;
 };

@@ -583,3 +583,15 @@ def test_an_estimator_is_cloned_by_its_parameters():
     assert "drop=0.02" in repr(other)
     with pytest.raises(stellate.InvalidArgument, match="'epsilon'"):
         other.set_params(epsilon=0.1)
+
+
+# A raster's squares have their four corners on one circle, but for its noise.
+@pytest.mark.parametrize("noise", [0.0, 1e-4, 0.01, 0.03])
+@pytest.mark.parametrize("height", [0.0, 3.0])
+def test_a_raster_of_heights_is_one_disc(noise, height, server, rng):
+    x, y = (c.ravel().astype(float) for c in np.meshgrid(np.arange(40), np.arange(30)))
+    z = height * np.sin(x / 9) * np.cos(y / 11) + noise * rng.standard_normal(len(x))
+    mesh = stellate.reconstruct(np.column_stack([x, y, z]), 2, closed=False, server=server)
+    assert len(mesh.simplices) == 2 * 39 * 29, mesh.report
+    assert topology.euler_characteristic(mesh.simplices) == 1
+    assert topology.component_count(mesh.simplices) == 1
