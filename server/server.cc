@@ -16,11 +16,14 @@
 
 #include "core/base/message.h"
 #include "server/base/log.h"
+#include "server/base/version.h"
 #include "server/config/listen_address.h"
 #include "server/config/settings.h"
 #include "server/drain.h"
 #include "server/net/guarded_server.h"
 #include "server/net/tls.h"
+#include "server/otlp/span_exporter.h"
+#include "server/otlp/span_settings.h"
 #include "server/postgres/database.h"
 #include "server/rpc/service.h"
 #include "stellate/v1/stellate.grpc.pb.h"
@@ -34,6 +37,7 @@ constexpr auto kTick = std::chrono::seconds(1);
 constexpr auto kLook = std::chrono::milliseconds(2);       // whether they have
 constexpr auto kFarewell = std::chrono::milliseconds(20);  // for clients to take leave
 constexpr auto kLastRound = std::chrono::seconds(5);       // for meshers to notice a cancel
+constexpr auto kLastSpans = std::chrono::seconds(2);       // for the collector to take them
 // The health of the process alone: it holds while the server drains.
 constexpr char kAlive[] = "alive";
 
@@ -91,6 +95,25 @@ class Server::Impl {
     return state.metrics.Listen(
         address, [this] { return state.store.All(); },
         [this] { return is_listening ? state.WhyNoNewMeshes() : "it waits for its database"; });
+  }
+
+  // Where spans go, if anybody asks for them. What is wrong in the environment, which many programs
+  // share, stops no server.
+  Status StartSpans() {
+    const auto found = FindSpanSettings(asked.traces_to, ReadEnvironment);
+    if (!found && !asked.traces_to.empty()) return found.error();
+    if (!found) {
+      Log(LogLevel::kWarning, {}, "no spans of meshes are sent",
+          LogFields().Add("why", found.error().message));
+    }
+    if (!found || !*found) return Status::Ok();
+    exporter = std::make_shared<SpanExporter>(
+        **found, Version(),
+        SpanExporter::Counts{state.metrics.SpansSent(), state.metrics.SpansDropped()});
+    state.spans = exporter;
+    Log(LogLevel::kInfo, {}, "spans of meshes are sent",
+        LogFields().Add("collector", (*found)->url.target));
+    return Status::Ok();
   }
 
   // Takes up the meshes of an earlier server.
@@ -162,6 +185,7 @@ class Server::Impl {
   ServerState state;
   Rpcs rpcs;
   UnknownRpcs unknown_rpcs;
+  std::shared_ptr<SpanExporter> exporter;  // null: nobody asks for spans
   std::unique_ptr<GuardedServer> server;
   bool stopped = false;
   std::mutex tick_mutex;
@@ -193,6 +217,8 @@ core::Expected<std::unique_ptr<Server>> Server::Start(const Config& config,
   impl->state.turns->WeighBy([authenticator = impl->state.authenticator](const std::string& owner) {
     return authenticator->WeightOf(owner);
   });
+  status = impl->StartSpans();
+  if (!status.ok()) return tl::unexpected(std::move(status));
   // While this waits for the database.
   if (!config.database.empty()) impl->ListenForPrometheus();
   status = impl->OpenJournal(give_up);
@@ -267,6 +293,7 @@ bool Server::Stop(Clock::duration drain, const std::function<bool()>& hurry) {
     if (state.journal != nullptr) state.journal->StopWaiting();
   });
   state.router.Join();
+  if (impl.exporter != nullptr) impl.exporter->Stop(kLastSpans);
   return clean;
 }
 

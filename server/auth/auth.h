@@ -14,6 +14,7 @@
 #include "core/status.h"
 #include "server/auth/tokens.h"
 #include "server/config/config.h"
+#include "server/spans/trace_context.h"
 
 namespace stellate::server {
 
@@ -24,6 +25,7 @@ struct Identity {
   bool administrator = false;  // sees and ends the meshes of all owners
   bool is_passed_on = false;   // by another server, which knows the caller
   std::string address;         // then: where the call came from
+  TraceHeaders trace{};        // that the call is a part of
 };
 
 // What servers know each other's calls by.

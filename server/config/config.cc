@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "core/base/message.h"
+#include "server/config/collector_url.h"
 #include "server/config/listen_address.h"
 #include "server/config/settings.h"
 #include "server/memory/machine_memory.h"
@@ -37,6 +38,10 @@ Status ValidateSafety(const Config& config, const ListenAddress& address) {
                              "\" in plain text, for others to read and use: give --tls-cert and "
                              "--tls-key"));
     }
+  }
+  if (!config.traces_to.empty()) {
+    const auto url = ParseCollectorUrl(config.traces_to);
+    if (!url) return url.error();
   }
   if (config.metrics_listen.empty()) return Status::Ok();
   const auto metrics = ParseListenAddress(config.metrics_listen, "--metrics-listen");

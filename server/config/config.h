@@ -24,6 +24,7 @@ struct Config {
   std::string tls_client_ca;             // PEM file; clients need a certificate of this authority
   std::string token_file;                // lines "owner token"; empty: no tokens
   std::string metrics_listen;            // host:port for Prometheus; empty: none
+  std::string traces_to;                 // URL of a collector; empty: as the environment says
 
   // Of the server.
   std::uint64_t max_meshes = 64;        // running at a time

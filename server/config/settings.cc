@@ -23,7 +23,7 @@ constexpr char kOwnerLimits[] = "Limits of each owner, where clients are authent
 constexpr char kMeshLimits[] = "Limits of each mesh";
 constexpr char kWorkers[] = "Workers";
 constexpr char kTimes[] = "Times, in seconds";
-constexpr char kLogs[] = "Logs and metrics";
+constexpr char kLogs[] = "Logs, metrics and traces";
 
 constexpr std::pair<LogLevel, const char*> kLevels[] = {
     {LogLevel::kTrace, "trace"},     {LogLevel::kDebug, "debug"}, {LogLevel::kInfo, "info"},
@@ -203,6 +203,10 @@ const std::vector<Setting>& Settings() {
 
       {kLogs, "--metrics-listen", &Config::metrics_listen,
        "HOST:PORT to answer Prometheus at, http://HOST:PORT/metrics; default: nowhere"},
+      {kLogs, "--traces-to", &Config::traces_to,
+       "http://HOST:PORT, or https:// for TLS, of a collector of OpenTelemetry that takes OTLP "
+       "over gRPC, to send spans of meshes to; default: what OTEL_EXPORTER_OTLP_ENDPOINT says, or "
+       "nowhere"},
       {kLogs, "--log-level", &Config::log_level, "trace, debug, info, warning, error or off", 0, 0,
        kLive},
       {kLogs, "--log-format", &Config::log_format, "text or json, on standard error"},

@@ -127,6 +127,10 @@ class Metrics::Impl final : public SessionObserver {
                                  "Times that two workers answered one query differently");
   Counter& received = Count("stellate_received_bytes_total", "Bytes of stream messages received");
   Counter& sent = Count("stellate_sent_bytes_total", "Bytes of stream messages sent");
+  Counter& spans_sent =
+      Count("stellate_spans_sent_total", "Spans of meshes that the collector took");
+  Counter& spans_dropped = Count("stellate_spans_dropped_total",
+                                 "Spans of meshes that found no room, or that no collector took");
   Counter& refused =
       Count("stellate_unauthenticated_total", "Calls refused because they had no valid token");
   prometheus::Family<Counter>& certificates =
@@ -222,6 +226,15 @@ void Metrics::PassedOn() { impl_->passed_on.Increment(); }
 void Metrics::Refused() { impl_->refused.Increment(); }
 void Metrics::LimitReached(const std::string& setting) {
   impl_->limits.Add({{"limit", setting}}).Increment();
+}
+std::function<void(std::size_t)> Metrics::SpansSent() const {
+  return
+      [impl = impl_](std::size_t spans) { impl->spans_sent.Increment(static_cast<double>(spans)); };
+}
+std::function<void(std::size_t)> Metrics::SpansDropped() const {
+  return [impl = impl_](std::size_t spans) {
+    impl->spans_dropped.Increment(static_cast<double>(spans));
+  };
 }
 void Metrics::Received(std::size_t bytes) { impl_->received.Increment(static_cast<double>(bytes)); }
 void Metrics::Sent(std::size_t bytes) { impl_->sent.Increment(static_cast<double>(bytes)); }

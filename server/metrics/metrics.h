@@ -41,6 +41,9 @@ class Metrics {
   void PassedOn();                                // a call, to another server
   void Refused();                                 // a call came without a good token
   void LimitReached(const std::string& setting);  // a call was refused by that limit
+  // Count spans that a collector took, and those that none did; may outlive this.
+  std::function<void(std::size_t)> SpansSent() const;
+  std::function<void(std::size_t)> SpansDropped() const;
   // Bytes of messages on streams, before compression and framing.
   void Received(std::size_t bytes);
   void Sent(std::size_t bytes);

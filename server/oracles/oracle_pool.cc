@@ -54,6 +54,7 @@ Allowed<WorkerId> OraclePool::Join(std::shared_ptr<OracleWorker> worker, std::ui
     }
     id = next_worker_++;
     display_names_[id] = worker->DisplayName();
+    if (follower_ != nullptr) follower_->OnJoined(id, display_names_[id], worker->Trace());
     members_.emplace(id, std::move(worker));
     worker_count_ = members_.size();
     dispatch_.Join(id, max_chunk);
@@ -74,6 +75,7 @@ void OraclePool::Leave(WorkerId worker) {
     gone = std::move(it->second);
     members_.erase(it);
     worker_count_ = members_.size();
+    if (follower_ != nullptr) follower_->OnLeft(worker);
     const TimePoint now = Clock::now();
     dispatch_.Leave(worker, now);
     deliveries = AssignLocked(now);
@@ -90,6 +92,7 @@ core::Expected<std::optional<Chunk>> OraclePool::Accept(WorkerId worker, LeaseId
     const TimePoint now = Clock::now();
     Lease lease;
     const auto result = dispatch_.Accept(worker, lease_id, now, &lease);
+    if (follower_ != nullptr) follower_->OnAnswered(lease_id, result);
     switch (result) {
       case Dispatch::AcceptResult::kUnknown:
         return core::Refuse(StatusCode::kInvalidArgument,
@@ -307,6 +310,7 @@ void OraclePool::Close(const WorkerEnd& end) {
     const TimePoint now = Clock::now();
     for (auto& [id, worker] : members_) {
       dispatch_.Leave(id, now);
+      if (follower_ != nullptr) follower_->OnLeft(id);
       workers.push_back(std::move(worker));
     }
     members_.clear();
@@ -321,6 +325,7 @@ std::vector<OraclePool::Delivery> OraclePool::AssignLocked(TimePoint now) {
   std::size_t hedged = 0;
   for (const Lease& lease : dispatch_.Assign(now)) {
     if (lease.twin != 0) ++hedged;
+    if (follower_ != nullptr) follower_->OnAsked(lease);
     deliveries.push_back({members_.at(lease.worker),
                           Chunk{lease.id, round_, lease.block, lease.first, lease.count}});
   }

@@ -17,6 +17,7 @@
 #include "server/base/refusal.h"
 #include "server/oracles/cross_check.h"
 #include "server/oracles/dispatch.h"
+#include "server/oracles/pool_follower.h"
 #include "server/oracles/wall_signs.h"
 
 namespace stellate::server {
@@ -73,6 +74,8 @@ class OracleWorker {
   virtual void End(const WorkerEnd& end) = 0;
   // For messages to people; called once, when the worker joins. Empty: it has no name.
   virtual std::string DisplayName() const { return ""; }
+  // That it came with; asked for as the name is.
+  virtual TraceHeaders Trace() const { return {}; }
 };
 
 // Receives what a pool does, for the metrics. Called from any thread; must not block.
@@ -129,6 +132,8 @@ class OraclePool {
                                         std::size_t block, Eigen::Index first, Eigen::Index count)>;
   // Before the first Ask.
   void SetOnAnswered(OnAnswered on_answered) { on_answered_ = std::move(on_answered); }
+  // Before the first Join; must outlive the pool.
+  void SetFollower(PoolFollower* follower) { follower_ = follower; }
   // Makes Ask return, and all later calls of it.
   void Interrupt();
 
@@ -174,6 +179,7 @@ class OraclePool {
   const std::size_t max_workers_;
   const std::shared_ptr<PoolObserver> observer_;  // may be null
   OnAnswered on_answered_;                        // may be empty
+  PoolFollower* follower_ = nullptr;              // may be null
 
   mutable std::mutex mutex_;
   std::condition_variable changed_;

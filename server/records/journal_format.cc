@@ -175,6 +175,8 @@ std::string EncodeStart(const MeshRequest& request, SystemTime create_time) {
   LayOutSpecification(writer, request.spec);
   writer.Number(request.timeouts.busy_limit.count());
   LayOutPoints(writer, request.points);
+  writer.Bytes(request.trace.parent);
+  writer.Bytes(request.trace.state);
   return writer.Take();
 }
 
@@ -194,6 +196,8 @@ bool DecodeStart(std::string_view record, MeshRequest* request, SystemTime* crea
   LayOutSpecification(reader, request->spec);
   reader.Number(busy_limit);
   LayOutPoints(reader, request->points);
+  reader.Bytes(request->trace.parent);
+  reader.Bytes(request->trace.state);
   *create_time = ToTime(time);
   request->timeouts.answer_limit = Clock::duration(answer_limit);
   request->timeouts.worker_wait = Clock::duration(worker_wait);

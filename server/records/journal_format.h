@@ -15,7 +15,7 @@
 namespace stellate::server {
 
 // What a journal's records hold. A change of any of these is a new kJournalVersion.
-inline constexpr std::uint32_t kJournalVersion = 18;
+inline constexpr std::uint32_t kJournalVersion = 19;
 
 // Where a record belongs. Numbers are stored: they stay as they are.
 enum class RecordKind : std::int64_t {
@@ -55,8 +55,8 @@ std::string EncodeState(const JournalState& state);
 std::optional<JournalState> DecodeState(std::string_view record);
 
 // Name, owner, label, the oracle's words, names of regions, scale, specification, the three times
-// that a client may ask for, and what was declared of points. What the server decides (chunk sizes,
-// numbers of workers) is not recorded: the next server may decide otherwise.
+// that a client may ask for, what was declared of points, and the trace. What the server decides
+// (chunk sizes, numbers of workers) is not recorded: the next server may decide otherwise.
 std::string EncodeStart(const MeshRequest& request,
                         std::chrono::system_clock::time_point create_time);
 // False: no such record.

@@ -9,6 +9,26 @@
 #include "server/convert/mesh.h"
 
 namespace stellate::server {
+namespace {
+
+// The trace that a call is a part of; empty where it says none, or none that can be.
+TraceHeaders TraceOf(const grpc::ServerContextBase& context) {
+  const auto& metadata = context.client_metadata();
+  TraceHeaders headers;
+  const auto parent = metadata.find(kTraceParent);
+  // Of two, nobody knows which is meant.
+  if (parent == metadata.end() || metadata.count(kTraceParent) > 1) return {};
+  headers.parent.assign(parent->second.data(), parent->second.size());
+  const auto state = metadata.find(kTraceState);
+  if (state != metadata.end()) headers.state.assign(state->second.data(), state->second.size());
+  const auto read = ReadTraceContext(headers);
+  if (!read) return {};
+  headers.parent.resize(kTraceParentBytes);
+  headers.state = read->state;
+  return headers;
+}
+
+}  // namespace
 
 void Audit(const Session& session, const Identity& caller, const std::string& peer,
            const char* action) {
@@ -54,7 +74,11 @@ void ShowMesh(const Call& call, const Session& session, v1::Mesh* mesh) {
 tl::expected<Identity, grpc::Status> Identify(ServerState& state,
                                               const grpc::ServerContextBase& context) {
   auto identity = state.authenticator->Identify(context);
-  if (!identity) state.metrics.Refused();
+  if (!identity) {
+    state.metrics.Refused();
+  } else {
+    identity->trace = TraceOf(context);
+  }
   return identity;
 }
 

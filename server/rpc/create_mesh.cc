@@ -20,8 +20,9 @@ grpc::Status InvalidId(const std::string& message) {
   return Refusal(v1::ERROR_REASON_INVALID_ARGUMENT, message, "mesh_id");
 }
 
-// Whether one client declared both, and the same of them.
-bool AreSame(const MeshRequest& a, const MeshRequest& b) {
+// Whether one client declared both, and the same of them, in whatever trace.
+bool AreSame(const MeshRequest& a, MeshRequest b) {
+  b.trace = a.trace;
   return EncodeStart(a, {}) == EncodeStart(b, {});
 }
 
@@ -47,6 +48,7 @@ class CreateStream final : public ServerStream<v1::CreateMeshRequest, v1::Mesh> 
     auto parsed = FromProto(request.spec(), *state().config());
     if (!parsed) return Refuse(state(), parsed.error(), "spec.");
     parsed->owner = caller().owner;
+    parsed->trace = caller().trace;
     if (request.mesh_id().empty()) return Begin(std::move(*parsed), nullptr);
     parsed->name = core::Message("meshes/", request.mesh_id());
     if (!IsMeshName(parsed->name)) {

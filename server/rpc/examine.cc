@@ -75,6 +75,7 @@ class ExamineStream final : public ServerStream<v1::ExamineRequest, v1::ExamineR
     SessionOptions options;
     options.request = std::move(request);
     options.request.owner = caller().owner;
+    options.request.trace = caller().trace;
     options.request.name = state().router.NewName();
     options.examiner = oracle->Examiner();
     ApplyServerPolicy(state(), &options);

@@ -106,6 +106,7 @@ class UploadStream final : public ServerStream<v1::PointsChunk, v1::ReconstructR
     auto declared = FromProto(spec, *state().config());
     if (!declared) return Refuse(server::Refuse(state(), declared.error(), "spec."));
     declared->owner = caller().owner;
+    declared->trace = caller().trace;
     const PointsRequest& points = *declared->points;
     const NewMeshBytes bytes{EstimateReconstructionBytes(points.spec, points.points),
                              points.points * BytesOfPoint(points)};

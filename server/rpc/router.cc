@@ -265,6 +265,9 @@ void Router::Introduce(const Route& route, const Identity& caller, const std::st
   passed_on->AddMetadata("authorization", Sign({route.server, BeatOf(route.server), caller.owner,
                                                 caller.administrator, address},
                                                sharing_->secret()));
+  const TraceHeaders& trace = caller.trace;
+  if (!trace.parent.empty()) passed_on->AddMetadata(kTraceParent, trace.parent);
+  if (!trace.state.empty()) passed_on->AddMetadata(kTraceState, trace.state);
   passed_on->set_deadline(call.deadline());
 }
 

@@ -59,7 +59,8 @@ class Router {
   // The same for a page of ListMeshes: pages go from server to server.
   void FindPage(const std::string& token, bool is_passed_on, Then then);
 
-  // Tells who the caller is to the server at the route's end, and takes over the call's deadline.
+  // Tells the server at the route's end who the caller is, and hands on the call's trace and
+  // deadline.
   void Introduce(const Route& route, const Identity& caller, const std::string& address,
                  const grpc::ServerContextBase& call, grpc::ClientContext* passed_on) const;
 

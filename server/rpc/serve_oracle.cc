@@ -66,6 +66,8 @@ class OracleStream final : public ServerStream<v1::ServeOracleRequest, v1::Serve
                          peer());
   }
 
+  TraceHeaders Trace() const override { return caller().trace; }
+
  private:
   void Handle(const v1::ServeOracleRequest& request) {
     const bool greeted = session() != nullptr;

@@ -51,6 +51,7 @@ void ApplyServerPolicy(ServerState& state, SessionOptions* options) {
   options->policy.max_watchers = config.max_watchers;
   options->ports.observer = state.metrics.observer();
   options->ports.turns = state.turns;
+  options->ports.spans = state.spans;
   options->ports.memory = MemoryBudget::Open(state.memory, options->request.owner);
 }
 

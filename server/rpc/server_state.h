@@ -14,6 +14,7 @@
 #include "server/rpc/router.h"
 #include "server/rpc/streams.h"
 #include "server/session/session_store.h"
+#include "server/spans/span.h"
 
 namespace stellate::server {
 
@@ -57,6 +58,7 @@ struct ServerState {
   SessionStore store;
   std::shared_ptr<Authenticator> authenticator;  // set before the first call
   Metrics metrics;
+  std::shared_ptr<SpanSink> spans;    // null: none are sent; set before the first mesh
   std::atomic<bool> draining{false};  // no new meshes
   Router router{this};
 };

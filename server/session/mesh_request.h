@@ -8,6 +8,7 @@
 #include "core/specification.h"
 #include "server/oracles/dispatch.h"
 #include "server/points/points_request.h"
+#include "server/spans/trace_context.h"
 
 namespace stellate::server {
 
@@ -22,6 +23,7 @@ struct MeshRequest {
   Eigen::VectorXd scale;
   core::Specification spec;
   OracleTimeouts timeouts;
+  TraceHeaders trace;  // of the call that made it
   // Set: the mesh is made of points, not of answers. `spec` then has its dimensions alone.
   std::optional<PointsRequest> points;
 };

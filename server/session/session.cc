@@ -65,6 +65,16 @@ core::Expected<std::unique_ptr<core::Mesher>> Begin(const MeshRequest& request,
   return std::make_unique<PointRounds>(*request.points, &intake->watch(), &intake->places());
 }
 
+const char* KindOf(const SessionOptions& options) {
+  if (options.examiner) return "examination";
+  return options.request.points ? "reconstruction" : "mesh";
+}
+
+// A mesh that has ended before told of itself then.
+std::shared_ptr<SpanSink> SinkOf(const SessionOptions& options) {
+  return options.record && options.record->end ? nullptr : options.ports.spans;
+}
+
 Life FirstLife(const std::optional<SessionRecord>& record) {
   if (!record) return Life::kMeshing;
   if (record->result) return Life::kOver;
@@ -92,6 +102,7 @@ Clock::duration AgeOf(std::chrono::system_clock::time_point time) {
 Session::Session(SessionOptions options, const MesherFactory& factory)
     : options_(std::move(options)),
       factory_(options_.examiner ? options_.examiner : factory),
+      spans_(SinkOf(options_), request(), KindOf(options_), options_.record.has_value()),
       pool_(request().spec, DispatchOptions{request().timeouts, policy().dispatch},
             policy().max_workers, ports().observer),
       intake_(IntakeOf(request())),
@@ -100,6 +111,7 @@ Session::Session(SessionOptions options, const MesherFactory& factory)
                                    : std::chrono::system_clock::now()),
       created_(CreatedAt(options_.record)),
       life_(FirstLife(options_.record)) {
+  if (spans_.IsActive()) pool_.SetFollower(&spans_);
   if (ports().journal != nullptr) {
     pool_.SetOnAnswered([journal = ports().journal.get()](const auto& round, std::size_t block,
                                                           auto first, auto count) {
@@ -181,6 +193,7 @@ void Session::RunRounds(core::Mesher* mesher) {
   while (true) {
     const Life now = life();  // as it was before NextBatch, all through this pass
     if (MustEnd(now)) mesher->Cancel();
+    const TimePoint planned = Clock::now();
     const auto batch = mesher->NextBatch();
     if (batch == nullptr) {
       if (auto failure = PublishRound(mesher)) FailBlameless(mesher, std::move(*failure));
@@ -195,7 +208,7 @@ void Session::RunRounds(core::Mesher* mesher) {
     } else if (server::IsReplaying(now)) {
       EndReplay(mesher, batch->round);
     } else if (FitsMemory(mesher, static_cast<std::uint64_t>(batch->size()))) {
-      RunRound(mesher, batch);
+      RunRound(mesher, batch, planned);
     }
   }
 }
@@ -228,6 +241,7 @@ void Session::EndReplay(core::Mesher* mesher, std::uint64_t next_round) {
     if (!life_.Step(LifeEvent::kReplayed)) return;
   }
   if (ports().on_replayed) ports().on_replayed();
+  spans_.Replayed(next_round - 1);
   Log(LogLevel::kInfo, {request().name, next_round, request().owner},
       "replayed; going on with new answers");
 }
@@ -250,12 +264,15 @@ bool Session::FitsMemory(core::Mesher* mesher, std::uint64_t queries) {
 }
 
 // While the workers are at this round's queries, watchers are shown what the last one led to.
-void Session::RunRound(core::Mesher* mesher, const std::shared_ptr<const core::QueryBatch>& batch) {
+void Session::RunRound(core::Mesher* mesher, const std::shared_ptr<const core::QueryBatch>& batch,
+                       TimePoint planned) {
+  const RoundSpan span(&spans_, *batch, planned);
   SessionJournal::Known known;
   if (ports().journal != nullptr) known = ports().journal->BeginRound(*batch);
   if (known.failure) return FailBlameless(mesher, std::move(*known.failure));
   const bool is_recorded = ports().journal == nullptr || known.answers.has_value();
   OraclePool::Outcome outcome = Ask(mesher, batch, std::move(known));
+  spans_.Step(intake_ == nullptr ? "ask" : "receive");
   if (outcome.failure) {
     // The worker at fault has been told on its own stream; the others are blameless.
     FailBlameless(mesher, std::move(*outcome.failure));
@@ -269,9 +286,12 @@ void Session::RunRound(core::Mesher* mesher, const std::shared_ptr<const core::Q
       FailBlameless(mesher, std::move(*failure));
       return;
     }
+    spans_.Step("record");
   }
   const auto queries = static_cast<std::size_t>(batch->size());
-  if (!Absorb(mesher, answers)) return;
+  const bool is_absorbed = Absorb(mesher, answers);
+  spans_.Step("absorb");
+  if (!is_absorbed) return;
   if (ports().observer != nullptr) {
     intake_ == nullptr ? ports().observer->OnRound(queries) : ports().observer->OnPoints(queries);
   }
@@ -364,6 +384,7 @@ void Session::FailBlameless(core::Mesher* mesher, MeshFailure failure) {
 
 void Session::Fail(core::Mesher* mesher, MeshFailure failure, core::Status status) {
   failure_ = std::move(failure);
+  spans_.Fail(failure_.message);
   blame_ = status;
   if (mesher != nullptr) mesher->Fail(std::move(status));
 }
@@ -451,6 +472,10 @@ void Session::ShowEnd(const Ending& ending) {
                             : "mesh ended",
       fields);
   pool_.Close({blame_});
+  // Of a mesh that goes on elsewhere, or later, this is no end: the next server tells of that.
+  spans_.End({ending.is_elsewhere || ending.is_suspended ? "SUSPENDED"
+                                                         : SessionStateName(ending.end.state),
+              ending.is_suspended ? MeshFailure() : ending.end.failure, ending.report, progress_});
   if (intake_ != nullptr) intake_->Close(blame_);
   history_.WakeWatchers();
   ports().recorded->Happen();  // also of a mesh that failed before it was recorded

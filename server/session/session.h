@@ -12,6 +12,7 @@
 #include "server/oracles/oracle_pool.h"
 #include "server/points/point_intake.h"
 #include "server/session/history_shelf.h"
+#include "server/session/mesh_spans.h"
 #include "server/session/session_life.h"
 #include "server/session/session_options.h"
 
@@ -99,7 +100,8 @@ class Session {
   void ReplayRound(core::Mesher* mesher, const core::QueryBatch& batch);
   void EndReplay(core::Mesher* mesher, std::uint64_t next_round);
   void RepeatEnd(core::Mesher* mesher);
-  void RunRound(core::Mesher* mesher, const std::shared_ptr<const core::QueryBatch>& batch);
+  void RunRound(core::Mesher* mesher, const std::shared_ptr<const core::QueryBatch>& batch,
+                TimePoint planned);
   OraclePool::Outcome Ask(core::Mesher* mesher,
                           const std::shared_ptr<const core::QueryBatch>& batch,
                           SessionJournal::Known known);
@@ -117,6 +119,7 @@ class Session {
 
   const SessionOptions options_;
   const MesherFactory factory_;
+  MeshSpans spans_;  // outlives the pool
   OraclePool pool_;
   const std::unique_ptr<PointIntake> intake_;  // of a reconstruction alone
   HistoryShelf history_;

@@ -11,6 +11,7 @@
 #include "server/memory/memory_budget.h"
 #include "server/oracles/oracle_pool.h"
 #include "server/session/session_journal.h"
+#include "server/spans/span.h"
 #include "server/turns/turns.h"
 
 namespace stellate::server {
@@ -41,6 +42,7 @@ struct SessionPorts {
   std::shared_ptr<SessionJournal> journal;        // may be null: the mesh lives in memory alone
   std::shared_ptr<MemoryBudget::Account> memory;  // may be null: its memory is not counted
   std::shared_ptr<Turns> turns;                   // may be null: it computes whenever it has work
+  std::shared_ptr<SpanSink> spans;                // may be null: none are sent
   // Called when the replay is over, and again before Run is; may be empty.
   std::function<void()> on_replayed;
   // Happens once the journal has the mesh, or will never have it: clients may hear of it then.

@@ -36,6 +36,8 @@ REFUSED: list[tuple[str, Any, str]] = [
     ("server.settings", {"max-mesh": 3}, "max-mesh"),
     ("server.settings", {"max-meshes": -1}, "minimum"),
     ("server.settings", {"listen": "0.0.0.0:1"}, "listen"),
+    ("server.env", [{"value": "x"}], "name"),
+    ("server.env", [{"name": "OTEL X"}], "OTEL X"),
     ("server.resources", {"limits": {"memory": None}}, "string"),
     ("server.resources", {"limits": {"memory": "4 GB"}}, "4 GB"),
     ("storage.kind", "disk", "disk"),

@@ -190,6 +190,14 @@ class Helm(unittest.TestCase):
         shown = {key: yaml.safe_load(read[key]) for key in settings}
         self.assertEqual(shown, settings)
 
+    def test_variables_of_the_environment(self) -> None:
+        key = {"secretKeyRef": {"name": "otel", "key": "headers"}}
+        variables = [{"name": "OTEL_EXPORTER_OTLP_HEADERS", "valueFrom": key}]
+        for kind, before in (("volume", 0), ("database", 1)):
+            rendering = self.render(server={"env": variables}, storage={"kind": kind})
+            self.assertEqual(container_of(rendering[_SERVER])["env"][before:], variables)
+        self.assertNotIn("env", container_of(self.render()[_SERVER]))
+
     def test_meshes_in_a_database(self) -> None:
         at = [{"ipBlock": {"cidr": "10.1.2.3/32"}}]
         rendering = self.render(storage={"kind": "database", "database": {"port": 6432, "at": at}})

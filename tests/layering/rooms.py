@@ -91,7 +91,8 @@ SERVER = {
     "server/base": (*FACE, "text"),
     "server/memory": (*FACE, "server/base"),
     "server/history": (*FACE, "server/base"),
-    "server/oracles": (*FACE, "server/base"),
+    "server/spans": (),
+    "server/oracles": (*FACE, "server/base", "server/spans"),
     "server/points": (*FACE, "server/base", "server/history"),
     "server/turns": (*FACE, "server/base"),
     "server/session": (
@@ -102,6 +103,7 @@ SERVER = {
         "server/memory",
         "server/history",
         "server/oracles",
+        "server/spans",
     ),
     # What a mesh's record looks like; the files it is in; who writes and reads them; salvage.
     "server/records": (*FACE, "server/base", "server/history", "server/oracles", "server/session"),
@@ -139,7 +141,9 @@ SERVER = {
         "server/session",
         "text",
     ),
-    "server/auth": (*FACE, "server/base", "server/config", "server/convert"),
+    "server/auth": (*FACE, "server/base", "server/config", "server/convert", "server/spans"),
+    # Spans on their way to a collector.
+    "server/otlp": (*FACE, "server/base", "server/config", "server/spans", "text"),
     "server/rpc": (
         *FACE,
         "proto",
@@ -151,6 +155,7 @@ SERVER = {
         "server/points",
         "server/records",
         "server/session",
+        "server/spans",
         "server/storage",
         "server/journal",
         "server/metrics",
@@ -171,6 +176,7 @@ SERVER = {
         "server/grpc_parts",
         "server/net",
         "server/metrics",
+        "server/otlp",
         "server/convert",
         "server/auth",
         "server/rpc",

@@ -12,6 +12,7 @@ from ._generated import stellate_pb2 as pb
 from ._generated import stellate_pb2_grpc as rpc
 from ._generated.mesh_pb2 import MeshSpec
 from ._rank import find_singular
+from ._trace import trace_headers
 from ._wire.calls import end
 from ._wire.spec import mesh_spec
 from .errors import ExecutorError, InvalidArgument, OracleError, from_rpc, protocol_error
@@ -48,7 +49,7 @@ def examine(
 def _ask_server(
     client: Client, stub: rpc.StellateStub, oracle: CheckedOracle, spec: MeshSpec
 ) -> CheckReport:
-    call = stub.Examine(pb.ExamineRequest(spec=spec))
+    call = stub.Examine(pb.ExamineRequest(spec=spec), metadata=trace_headers())
     failure: Exception | None = None
     try:
         for response in call:

@@ -16,6 +16,7 @@ from ._generated import oracle_pb2 as pb
 from ._generated import stellate_pb2_grpc as rpc
 from ._generated.stellate_pb2 import GetMeshRequest
 from ._reconnect import WAITS, Reconnector, ReconnectPolicy
+from ._trace import trace_headers
 from ._wire import enums
 from ._wire.arrays import fill, from_wire
 from ._wire.calls import end
@@ -206,6 +207,7 @@ class Worker:
         )
         self._call: Any = None
         self._attempts = Reconnector(policy, quiet)
+        self._trace = trace_headers()  # of who has it serve, on whatever thread it does
         self._stopped = threading.Event()
 
     def run(self) -> str:
@@ -245,7 +247,7 @@ class Worker:
     def _serve(self) -> str:
         outbox = _Outbox()
         outbox.put(pb.ServeOracleRequest(hello=self._hello))
-        call = self._call = self._stub.ServeOracle(iter(outbox))
+        call = self._call = self._stub.ServeOracle(iter(outbox), metadata=self._trace)
         if self._stopped.is_set():
             call.cancel()
         try:

@@ -23,6 +23,7 @@ from ._reconnect import WAITS, Reconnector, ReconnectPolicy
 from ._saved import SavedMesh
 from ._shared import text
 from ._streams import Parts, Watch
+from ._trace import trace_headers
 from ._upload import Upload
 from ._wire.spec import mesh_spec
 from ._worker import Ask, Worker, answer
@@ -125,7 +126,7 @@ class Client:
         chunks = iter([pb.PointsChunk(spec=points.spec)])
         attempts = Reconnector(self._policy)
         try:
-            reply = self._stub.Reconstruct(chunks, timeout=WAITS["call"])
+            reply = self._stub.Reconstruct(chunks, timeout=WAITS["call"], metadata=trace_headers())
         except grpc.RpcError as error:
             attempts.stop()
             attempts.wait_or_raise(error, from_rpc(error))
@@ -286,7 +287,7 @@ class Client:
         attempts = attempts or Reconnector(self._policy)
         while True:
             try:
-                answer = method(request, timeout=WAITS["call"])
+                answer = method(request, timeout=WAITS["call"], metadata=trace_headers())
             except grpc.RpcError as error:
                 if once:
                     attempts.stop()
