@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import concurrent.futures
 import contextlib
 import hmac
 import time
@@ -42,6 +43,28 @@ def test_any_server_takes_any_call(cluster, undisturbed):
                 client.get("meshes/" + 32 * "f")
     made = stellate.mesh(manifolds.Torus(), EPSILON, server=second.address)
     assert are_same(made, undisturbed)
+
+
+def test_the_trace_of_a_call_goes_along_to_the_server_that_has_its_mesh(cluster, monkeypatch):
+    collector = grpc.server(concurrent.futures.ThreadPoolExecutor(1))
+    bodies = []
+    export = grpc.unary_unary_rpc_method_handler(lambda body, _: (bodies.append(body), b"")[1])
+    service = "opentelemetry.proto.collector.trace.v1.TraceService"
+    collector.add_generic_rpc_handlers(
+        [grpc.method_handlers_generic_handler(service, {"Export": export})]
+    )
+    port = collector.add_insecure_port("127.0.0.1:0")
+    collector.start()
+    monkeypatch.setenv("OTEL_EXPORTER_OTLP_ENDPOINT", f"http://127.0.0.1:{port}")
+    first, second = cluster.ready("first", "second")
+    with stellate.Client(second.address) as owner, stellate.Client(first.address) as other:
+        name = owner.create(manifolds.Torus(), EPSILON, worker_wait_seconds=PATIENCE).name
+        worker = other.worker(manifolds.Torus(), name)
+        trace = "0af7651916cd43dd8448eb211c80319c"
+        worker._trace = (("traceparent", f"00-{trace}-b7ad6b7169203331-01"),)
+        assert worker.run() == "SUCCEEDED"
+    wait_for(lambda: any(bytes.fromhex(trace) in body for body in bodies))
+    collector.stop(None)
 
 
 def declare(stub: pb_grpc.StellateStub, request: pb.CreateMeshRequest) -> str:
