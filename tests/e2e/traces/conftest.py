@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import concurrent.futures
+import contextlib
+import os
 import pathlib
 import socket
 import sys
 import threading
+from collections.abc import Iterator
 
 import grpc
 import pytest
@@ -68,7 +71,27 @@ def free_port() -> int:
         return free.getsockname()[1]
 
 
-@pytest.fixture
-def dead_url():
-    """Where nobody listens."""
-    return f"http://127.0.0.1:{free_port()}"
+@contextlib.contextmanager
+def stranger(kind: str) -> Iterator[str]:
+    """The URL of what is no collector: nothing listens there ("away"), or what does is "mute", or sends
+    "garbage" for as long as it is read."""
+    if kind == "away":
+        yield f"http://127.0.0.1:{free_port()}"
+        return
+    with socket.create_server(("127.0.0.1", 0)) as listening:
+        threading.Thread(target=_receive, args=(listening, kind), daemon=True).start()
+        yield f"http://127.0.0.1:{listening.getsockname()[1]}"
+        listening.shutdown(socket.SHUT_RDWR)  # wakes the thread
+
+
+def _receive(listening: socket.socket, kind: str) -> None:
+    callers = []  # kept open
+    while True:
+        try:
+            callers.append(listening.accept()[0])
+        except OSError:
+            return
+        if kind == "garbage":
+            with contextlib.suppress(OSError):
+                while True:
+                    callers[-1].sendall(os.urandom(65536))
