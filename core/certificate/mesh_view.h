@@ -56,6 +56,12 @@ struct MeshView {
   const double* Tangent(std::uint32_t v) const { return tangents + std::size_t{v} * d * k; }
 };
 
+// Points of M, d each, and the walls that each is on.
+struct PointsOnWalls {
+  std::vector<double> points;
+  std::vector<WallSet> walls;
+};
+
 // Facts that only the stars give.
 struct StarFacts {
   std::uint64_t inconsistent_simplices = 0;
@@ -63,18 +69,13 @@ struct StarFacts {
   bool converged = false;             // no rule is broken
   double max_size_ratio = 0;          // max R_p / size(p) where the size is graded, else 0
   std::vector<double> lone_points{};  // each all of M around it, d coordinates: no mesh shows them
+  PointsOnWalls touches{};            // corners, each all of these walls around it
   double same_point = 0;              // points nearer to each other than this are one, length
   bool covers_box = false;  // every component of M in the bounding box is met, if the declared
                             // reach is true
   double tangent_error_length = 0;  // sin(tangent_error) times the reach (TangentFinder), length
   double protection = 0;            // R5's bound, length; 0: it was not asked for
   CentreRule centre_rule = CentreRule::kTangentSpace;  // where stars judge simplices
-};
-
-// Points of M, d each, and the walls that each is on.
-struct PointsOnWalls {
-  std::vector<double> points;
-  std::vector<WallSet> walls;
 };
 
 // Points of M that lie on one wall each: the point (d), the wall, and the wall's outward conormal

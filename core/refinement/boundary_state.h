@@ -79,6 +79,15 @@ class BoundaryState {
     lone_points_.insert(lone_points_.end(), point.begin(), point.end());
   }
   const std::vector<double>& lone_points() const { return lone_points_; }
+  // Keeps a corner that is all of each of these walls around it: they only touch M there.
+  struct Touch {
+    Eigen::VectorXd point;
+    WallSet walls;
+  };
+  void NoteTouch(const Eigen::VectorXd& point, WallSet walls) {
+    if (walls != 0) touches_.push_back({point, walls});
+  }
+  const std::vector<Touch>& touches() const { return touches_; }
   std::vector<Crowd> TakeCrowds() { return std::exchange(crowds_, {}); }
 
   // The radius of the concentric shell around a corner, on which the first points of all its edges
@@ -120,6 +129,7 @@ class BoundaryState {
   std::vector<Crowd> crowds_;
   std::vector<Eigen::VectorXd> crowded_;  // where all that were kept are
   std::vector<double> lone_points_;
+  std::vector<Touch> touches_;
   Eigen::VectorXd largest_clearances_;  // by wall
   std::map<std::uint32_t, double> shells_;
 };

@@ -207,8 +207,10 @@ std::optional<CrowdedCorner> Corners<K>::SettleCone(const Known& known) {
   const CornerCone<K> cone = ConeOf<K>(walls, known.ConormalsOf(walls).data());
   if (cone.rays.empty()) {  // M has no more than that point there
     engine_.boundary.NoteLonePoint(known.crowd.point);
+    engine_.boundary.NoteTouch(known.crowd.point, walls);
     return std::nullopt;
   }
+  engine_.boundary.NoteTouch(known.crowd.point, walls & ~cone.walls);
   if (!cone.is_simple) return CrowdedCorner{known.crowd.point, walls, cone.crowded};
   Insert(known, cone.walls, 0);
   return std::nullopt;
@@ -238,6 +240,7 @@ std::optional<CrowdedCorner> Corners<K>::SettleSectors(const Known& known) {
   if (const WallSet together = CrossedTogether(labels, known.at, signs); together != 0)
     return CrowdedCorner{crowd.point, known.at, together};
   const WallSet active = ActiveAround(labels, known.at, signs);
+  engine_.boundary.NoteTouch(crowd.point, known.at & ~active);
   if (labels.Codimension(active) < K) return std::nullopt;
   // Walls that only touch M there, each sector on one side of them, and all on the same.
   WallSet inside = ~WallSet{0}, outside = ~WallSet{0};

@@ -65,6 +65,10 @@ StarFacts FactsOf(Engine<K>& engine) {
   facts.protection = engine.protection().delta();
   facts.centre_rule = engine.criteria().centre_rule;
   facts.lone_points = engine.boundary().lone_points();
+  for (const auto& touch : engine.boundary().touches()) {
+    facts.touches.points.insert(facts.touches.points.end(), touch.point.begin(), touch.point.end());
+    facts.touches.walls.push_back(touch.walls);
+  }
   facts.same_point = BoundaryState<K>::kSameCorner * engine.criteria().epsilon;
   const bool agreed = engine.filled().is_handed_out();
   const bool leaves_inside = engine.boundary().policy().LeavesInside();

@@ -35,6 +35,16 @@ bool Examination::IsLonePoint(const double* y) const {
   return false;
 }
 
+bool Examination::IsTouched(const double* y, int wall) const {
+  const auto d = static_cast<std::size_t>(mesh.d);
+  const PointsOnWalls& touches = facts.touches;
+  for (std::size_t i = 0; i < touches.walls.size(); ++i)
+    if (IsSubset(SetOfWall(wall), touches.walls[i]) &&
+        Distance(touches.points.data() + i * d, y, mesh.d) <= facts.same_point)
+      return true;
+  return false;
+}
+
 void Examination::ReportPinched() {
   certificate.pinched_vertices = pinched.size();
   if (pinched.empty()) return;

@@ -36,6 +36,8 @@ struct Examination {
   double DistanceAllowed(double circumradius) const;
   // Whether y (d) is a point that no mesh shows.
   bool IsLonePoint(const double* y) const;
+  // Whether y (d) is a corner that the wall only touches: it has no simplex there.
+  bool IsTouched(const double* y, int wall) const;
   // Writes Certificate::pinched_vertices, and a warning with the first place, from `pinched`.
   void ReportPinched();
   double Circumradius(const std::uint32_t* ids) const;

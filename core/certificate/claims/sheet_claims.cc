@@ -272,7 +272,7 @@ void SheetClaims::JudgeEnds(std::size_t wall, const std::vector<End>& ends) {
       boundary_.TakePoint(static_cast<int>(wall), sheet.Ids(*nearest[n]), ends[n].y);
       continue;
     }
-    if (x_.IsLonePoint(ends[n].y)) continue;
+    if (x_.IsTouched(ends[n].y, static_cast<int>(wall))) continue;
     missed.push_back(ends[n].y);
     wanted.points.insert(wanted.points.end(), ends[n].y, ends[n].y + x_.mesh.d);
     wanted.walls.push_back(SetOfWall(static_cast<int>(wall)));

@@ -80,6 +80,15 @@ std::vector<Solid> Solids() {
     cell("its corner", {0, 0, 0}, epsilon, {1, 2, 0, 0});
     cell("its middle", {kPi, kPi, kPi}, epsilon, {1, 2, 0, 0});
   }
+  // Where rounding finds the gyroid's one point in a corner inside of all other walls.
+  for (const unsigned turn : {1u, 3u, 5u})
+    solids.push_back({"gyroid in a cell from its middle, turned",
+                      [turn, middle = Eigen::Vector3d(kPi, kPi, kPi)] {
+                        return stellate::testing::GyroidCell(middle).Turned(turn);
+                      },
+                      0.45,
+                      {1, 2, 0, 0},
+                      kCell / 2});
   for (const double degrees : {55.0, 52.0, 50.5, 50.0, 45.0, 35.0, 25.0, 20.0})
     for (const double share : {0.4, 0.2}) {
       const double half = degrees * kPi / 360, up = std::cos(half);

@@ -341,10 +341,31 @@ def gyroid(x):
 
 # In two of its corners such a cell has nothing of the solid around it but the corner, which rounding
 # finds inside or not.
-@pytest.mark.parametrize("low, angle", [(0.0, 0.0), (np.pi, 0.0), (0.0, 0.1)])
-def test_a_gyroid_in_a_cell_that_begins_at_its_corner(low, angle, server):
+@pytest.mark.parametrize(
+    "low, axis, angle",
+    [
+        (0.0, [0, 0, 1], 0.0),
+        (np.pi, [0, 0, 1], 0.0),
+        (0.0, [0, 0, 1], 0.1),
+        (np.pi, [1, 2, 3], 1.0),
+    ],
+)
+def test_a_gyroid_in_a_cell_that_begins_at_its_corner(low, axis, angle, server):
     cell = s.Box([low] * 3, [low + 2 * np.pi] * 3) & s.Implicit(gyroid)
-    mesh = stellate.mesh(cell.rotated(s.rotation([0, 0, 1], angle)), 0.45, server=server)
+    mesh = stellate.mesh(cell.rotated(s.rotation(axis, angle)), 0.45, server=server)
     hold(mesh, -1, 7)
     assert volume(mesh) == pytest.approx(4 * np.pi**3, rel=0.02)
     assert any("has a point by itself" in warning for warning in mesh.report.certificate.warnings)
+
+
+# A ball's sphere has a corner of a cube within it in common with that, and nothing else: rounding finds
+# that point on the sphere inside of the cube or not.
+@pytest.mark.parametrize("axis, angle", [([3, -1, 2], 0.5), ([1, 2, 3], 2.0), ([1, -3, 1], 1.0)])
+def test_a_wall_that_touches_a_corner_has_no_piece_there(axis, angle, server):
+    turn, centre = s.rotation(axis, angle), [5 / 7] * 3
+    cube = s.Box([0] * 3, [1.2] * 3).rotated(turn).at([0.3, -0.2, 1.1])
+    ball = s.Ball(norm(centre), at=centre).rotated(turn).at([0.3, -0.2, 1.1])
+    mesh = stellate.mesh(s.Labels(rest=cube, common=cube & ball), 0.25, server=server)
+    hold(mesh, 1, 6)
+    assert mesh.report.certificate.warnings == ()
+    assert volume(mesh) == pytest.approx(1.2**3)
