@@ -6,6 +6,7 @@
 
 #include "core/base/parallel.h"
 #include "core/geometry/draft_polygon.h"
+#include "core/parts/share_out.h"
 
 namespace stellate::core {
 namespace {
@@ -199,6 +200,30 @@ double BallAround(std::span<const BallTree::Bunch> bunches, int d, std::vector<d
   return radius;
 }
 
+// So many searches that follow each other are one part's: neighbours find each other's points in
+// the cache.
+constexpr std::size_t kSharedBunches = 16;
+
+// The stars of bunches, and their influences, as messages between parts.
+template <typename Cell>
+void PackStars(std::span<const BallTree::Bunch> bunches, const Blocks<Cell>& stars,
+               const double* influence, Peers::Bytes* message) {
+  for (const BallTree::Bunch& bunch : bunches)
+    for (const std::uint32_t p : std::span(bunch.ids, bunch.count)) {
+      stars[p].PackTo(message);
+      Pack(influence[p], message);
+    }
+}
+template <typename Cell>
+void UnpackStars(std::span<const BallTree::Bunch> bunches, Blocks<Cell>* stars, double* influence,
+                 Parcel* parcel) {
+  for (const BallTree::Bunch& bunch : bunches)
+    for (const std::uint32_t p : std::span(bunch.ids, bunch.count)) {
+      (*stars)[p].Unpack(parcel);
+      parcel->Unpack(1, &influence[p]);
+    }
+}
+
 // The largest size bound at the points of a bunch.
 template <int K>
 double LargestBound(const Sample<K>& sample, const BallTree::Bunch& bunch) {
@@ -233,7 +258,7 @@ void BulkStarBuilder<K>::Build(Blocks<Cell>* stars, double* influence) const {
         !sample_.has_protecting_balls())
       return BuildPolygons(stars, influence);
   const std::vector<BallTree::Bunch> bunches = sample_.tree().Bunches();
-  ParallelFor(bunches.size(), [&](std::size_t b) {
+  const auto build = [&](std::size_t b) {
     thread_local std::vector<std::uint32_t> ids;
     thread_local PointsAround around;
     thread_local Cell cell;  // its memory is used again; what is kept is no larger than it must be
@@ -246,7 +271,15 @@ void BulkStarBuilder<K>::Build(Blocks<Cell>* stars, double* influence) const {
       (*stars)[p] = cell;
       influence[p] = builder_.Influence(p, cell);
     }
-  });
+  };
+  ShareOut(
+      peers_, bunches.size(), kSharedBunches, build,
+      [&](std::size_t b, Peers::Bytes* message) {
+        PackStars(std::span(&bunches[b], 1), *stars, influence, message);
+      },
+      [&](std::size_t b, Parcel* parcel) {
+        UnpackStars(std::span(&bunches[b], 1), stars, influence, parcel);
+      });
 }
 
 template <int K>
@@ -254,10 +287,16 @@ void BulkStarBuilder<K>::BuildPolygons(Blocks<Cell>* stars, double* influence) c
   const std::vector<BallTree::Bunch> bunches = sample_.tree().Bunches();
   const std::vector<std::size_t> begins = CutIntoStretches(
       bunches, sample_.d(), [this](std::uint32_t p) { return sample_.BoundAt(p); });
-  ParallelFor(begins.size() - 1, [&](std::size_t i) {
-    BuildPolygonsOf(std::span(bunches).subspan(begins[i], begins[i + 1] - begins[i]), stars,
-                    influence);
-  });
+  const auto stretch = [&](std::size_t i) {
+    return std::span(bunches).subspan(begins[i], begins[i + 1] - begins[i]);
+  };
+  ShareOut(
+      peers_, begins.size() - 1, kSharedBunches,
+      [&](std::size_t i) { BuildPolygonsOf(stretch(i), stars, influence); },
+      [&](std::size_t i, Peers::Bytes* message) {
+        PackStars(stretch(i), *stars, influence, message);
+      },
+      [&](std::size_t i, Parcel* parcel) { UnpackStars(stretch(i), stars, influence, parcel); });
 }
 
 // One search serves all of them. The part that a bunch needs is copied: most of the time goes into

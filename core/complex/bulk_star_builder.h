@@ -7,6 +7,7 @@
 
 #include "core/base/instantiate.h"
 #include "core/complex/star_builder.h"
+#include "core/peers.h"
 
 namespace stellate::core {
 
@@ -32,9 +33,9 @@ class BulkStarBuilder {
  public:
   using Cell = RestrictedVoronoiCell<K>;
 
-  // `builder`: borrowed.
-  explicit BulkStarBuilder(const StarBuilder<K>& builder)
-      : builder_(builder), sample_(builder.sample()) {}
+  // peers: the parts that build them together, each all of them; all is borrowed
+  explicit BulkStarBuilder(const StarBuilder<K>& builder, const Peers& peers = NoPeers())
+      : builder_(builder), sample_(builder.sample()), peers_(peers) {}
 
   // Writes the star of each point, by id, and its influence (StarBuilder::Influence). In parallel;
   // the same for any number of threads. REQUIRES: `stars` has as many places as the sample points.
@@ -50,6 +51,7 @@ class BulkStarBuilder {
 
   const StarBuilder<K>& builder_;
   const Sample<K>& sample_;
+  const Peers& peers_;
 };
 
 STELLATE_DECLARE_CLASS(BulkStarBuilder)

@@ -39,6 +39,15 @@ struct StarCut {
   }
 };
 
+// The cuts of one star. Stars are cut in the order of the first new points that cut them.
+struct StarCuts {
+  std::uint32_t first, star;  // the first new point that cuts the star
+  std::size_t begin, end;     // its cuts
+  bool operator<(const StarCuts& other) const {
+    return first != other.first ? first < other.first : star < other.star;
+  }
+};
+
 // Sample points around a place as (squared distance, id).
 using NearPoints = std::vector<std::pair<double, std::uint32_t>>;
 

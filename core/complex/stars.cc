@@ -7,6 +7,7 @@
 #include "core/base/parallel.h"
 #include "core/base/parallel_sort.h"
 #include "core/complex/bulk_star_builder.h"
+#include "core/parts/share_out.h"
 
 namespace stellate::core {
 namespace {
@@ -14,6 +15,9 @@ namespace {
 // The point itself, and enough neighbours to close a cell.
 template <int K>
 inline constexpr int kNearestFirst = 2 * K + 3;
+
+// So many new stars that follow each other are one part's to build.
+constexpr std::size_t kSharedStars = 16;
 
 // After a sample was added in bulk the rules mostly insert fewer points than one in so many.
 constexpr std::size_t PartsToCome(int k) { return k <= 2 ? 8 : 4; }
@@ -43,6 +47,36 @@ void ForEachOwnedTriangle(std::uint32_t p, const Polygon& cell, const Visit& vis
 template <std::size_t N>
 void AppendTo(std::vector<std::uint32_t>* ids, const std::array<std::uint32_t, N>& simplex) {
   ids->insert(ids->end(), simplex.begin(), simplex.end());
+}
+
+// Whether a new point cuts a cell of p's star.
+template <int K>
+bool IsCutBy(const Stars<K>& stars, const StarBuilder<K>& builder, std::uint32_t p, const Site& q) {
+  const Site site = stars.sample().At(p);
+  for (int sector = 0; sector < stars.sample().sectors().Count(p); ++sector)
+    if (builder.IsCutBy(stars.cell(p, sector), site, q)) return true;
+  return false;
+}
+
+// Writes all cells of a point for another part, which Stars<K>::UnpackCells reads.
+template <int K>
+void PackCells(const Stars<K>& stars, std::uint32_t p, Peers::Bytes* message) {
+  for (int sector = 0; sector < stars.sample().sectors().Count(p); ++sector)
+    stars.cell(p, sector).PackTo(message);
+}
+
+// Consecutive new points are mostly near each other: stars in the order of their first cuts find in
+// the cache what their neighbours have read.
+std::vector<StarCuts> InTurns(const std::vector<StarCut>& cuts) {
+  std::vector<StarCuts> turns =
+      ParallelGather<StarCuts>(cuts.size(), [&](std::size_t i, auto* found) {
+        if (i > 0 && cuts[i].star == cuts[i - 1].star) return;
+        std::size_t end = i + 1;
+        while (end < cuts.size() && cuts[end].star == cuts[i].star) ++end;
+        found->push_back({cuts[i].by, cuts[i].star, i, end});
+      });
+  ParallelSort(turns, std::less<>());
+  return turns;
 }
 
 }  // namespace
@@ -221,14 +255,6 @@ typename Stars<K>::Cell& Stars<K>::MutableCell(std::uint32_t id, int sector) {
                      : more_cells_[more_at_[id] + static_cast<std::size_t>(sector) - 1];
 }
 
-template <int K>
-bool Stars<K>::IsCutBy(const StarBuilder<K>& builder, std::uint32_t p, const Site& q) const {
-  const Site site = sample_.At(p);
-  for (int sector = 0; sector < sample_.sectors().Count(p); ++sector)
-    if (builder.IsCutBy(cell(p, sector), site, q)) return true;
-  return false;
-}
-
 // Appends the sample points that most likely close a cell around q, the nearest first: the nearest
 // points or, if a star near q is known, that star and the stars of its points nearest to q.
 template <int K>
@@ -294,36 +320,44 @@ std::vector<StarCut> Stars<K>::BuildNewStars(std::uint32_t first) {
   cells_.resize(size());
   more_cells_.resize(more_count_);
   const StarBuilder<K> builder = this->builder();
-  std::vector<StarCut> cuts =
-      ParallelGather<StarCut>(near_.size(), [&](std::size_t i, auto* found) {
-        thread_local std::vector<std::uint32_t> closing, influenced;
-        thread_local Cell cell;  // its memory is used again; what is kept is as small as can be
-        const Site q = sample_.At(first + static_cast<std::uint32_t>(i));
-        FindClosing(q.point, near_[i], &closing);
-        for (int sector = 0; sector < sample_.sectors().Count(q.id); ++sector) {
-          builder.Build(sample_.At(q.id, sector), closing, &cell, &influenced);
-          MutableCell(q.id, sector) = cell;
-        }
-        for (const std::uint32_t p : influenced)
-          if (IsCutBy(builder, p, q)) found->push_back({p, q.id});
-      });
+  const auto build = [&](std::size_t i, std::vector<StarCut>* found) {
+    thread_local std::vector<std::uint32_t> closing, influenced;
+    thread_local Cell cell;  // its memory is used again; what is kept is as small as can be
+    const Site q = sample_.At(first + static_cast<std::uint32_t>(i));
+    FindClosing(q.point, near_[i], &closing);
+    for (int sector = 0; sector < sample_.sectors().Count(q.id); ++sector) {
+      builder.Build(sample_.At(q.id, sector), closing, &cell, &influenced);
+      MutableCell(q.id, sector) = cell;
+    }
+    for (const std::uint32_t p : influenced)
+      if (IsCutBy(*this, builder, p, q)) found->push_back({p, q.id});
+  };
+  std::vector<StarCut> cuts;
+  if (peers_->parts() == 1) {
+    cuts = ParallelGather<StarCut>(near_.size(), build);
+  } else {
+    std::vector<std::vector<StarCut>> found(near_.size());
+    ShareOut(
+        *peers_, found.size(), kSharedStars, [&](std::size_t i) { build(i, &found[i]); },
+        [&](std::size_t i, Peers::Bytes* message) {
+          PackCells(*this, first + static_cast<std::uint32_t>(i), message);
+          PackAll(found[i], message);
+        },
+        [&](std::size_t i, Parcel* parcel) {
+          UnpackCells(first + static_cast<std::uint32_t>(i), parcel);
+          parcel->UnpackAll(&found[i]);
+        });
+    cuts = Concatenate(std::move(found));
+  }
   near_.clear();
   ParallelSort(cuts, std::less<>());
   return cuts;
 }
 
-// Consecutive new points are mostly near each other: stars in the order of their first cuts find in
-// the cache what their neighbours have read.
 template <int K>
-std::vector<typename Stars<K>::Turn> Stars<K>::InTurns(const std::vector<StarCut>& cuts) {
-  std::vector<Turn> turns = ParallelGather<Turn>(cuts.size(), [&](std::size_t i, auto* found) {
-    if (i > 0 && cuts[i].star == cuts[i - 1].star) return;
-    std::size_t end = i + 1;
-    while (end < cuts.size() && cuts[end].star == cuts[i].star) ++end;
-    found->push_back({cuts[i].by, cuts[i].star, i, end});
-  });
-  ParallelSort(turns, std::less<>());
-  return turns;
+void Stars<K>::UnpackCells(std::uint32_t p, Parcel* parcel) {
+  for (int sector = 0; sector < sample_.sectors().Count(p); ++sector)
+    MutableCell(p, sector).Unpack(parcel);
 }
 
 // Returns the simplices whose lowest vertex is p, once each, with the label that LabelsOf gives
@@ -367,14 +401,20 @@ double Stars<K>::CutSectors(std::uint32_t p, std::span<const StarCut> cuts,
 // Clips the old stars. A simplex that a cut creates has the new point as a vertex, whose id is
 // `first` or more; any other simplex was there before.
 template <int K>
-void Stars<K>::CutStars(const std::vector<Turn>& turns, const std::vector<StarCut>& cuts,
+void Stars<K>::CutStars(const std::vector<StarCuts>& turns, const std::vector<StarCut>& cuts,
                         std::uint32_t first, Change* change) {
   const std::uint32_t count = size() - first;
   const StarBuilder<K> builder = this->builder();
   std::vector<std::vector<std::uint32_t>> removed(ChunkCount(turns.size()));
   std::vector<std::vector<std::uint32_t>> added(removed.size() + ChunkCount(count));
   std::vector<double> influence(turns.size() + count);
-  ParallelChunks(turns.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+  const std::size_t size_of_chunk = ChunkSize(turns.size());
+  const auto range = [&](std::size_t chunk) {
+    const std::size_t begin = chunk * size_of_chunk;
+    return std::pair(begin, std::min(turns.size(), begin + size_of_chunk));
+  };
+  const auto cut = [&](std::size_t chunk) {
+    const auto [begin, end] = range(chunk);
     // For K = 2 the ids of the facets distinguish simplices, else keys.
     std::vector<std::pair<std::uint64_t, Simplex>> before;
     const auto key_of = [](const Cell& cell, std::size_t v) {
@@ -404,7 +444,27 @@ void Stars<K>::CutStars(const std::vector<Turn>& turns, const std::vector<StarCu
       });
       influence[i] = builder.Influence(p, cell);
     }
-  });
+  };
+  ShareOut(
+      *peers_, removed.size(), 1, cut,
+      [&](std::size_t chunk, Peers::Bytes* message) {
+        PackAll(removed[chunk], message);
+        PackAll(added[chunk], message);
+        const auto [begin, end] = range(chunk);
+        for (std::size_t i = begin; i < end; ++i) {
+          PackCells(*this, turns[i].star, message);
+          Pack(influence[i], message);
+        }
+      },
+      [&](std::size_t chunk, Parcel* parcel) {
+        parcel->UnpackAll(&removed[chunk]);
+        parcel->UnpackAll(&added[chunk]);
+        const auto [begin, end] = range(chunk);
+        for (std::size_t i = begin; i < end; ++i) {
+          UnpackCells(turns[i].star, parcel);
+          parcel->Unpack(1, &influence[i]);
+        }
+      });
   // A new point has the largest id of its simplices, except of those among new points alone.
   ParallelChunks(count, [&](std::size_t chunk, std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) {
@@ -429,7 +489,7 @@ void Stars<K>::CutStars(const std::vector<Turn>& turns, const std::vector<StarCu
 
 // `influence`: of the stars of `turns`, and of those from `first` on.
 template <int K>
-void Stars<K>::SetInfluences(const std::vector<Turn>& turns, std::uint32_t first,
+void Stars<K>::SetInfluences(const std::vector<StarCuts>& turns, std::uint32_t first,
                              const std::vector<double>& influence) {
   BallTree& tree = sample_.tree();
   for (std::size_t i = 0; i < influence.size(); ++i) {
@@ -445,11 +505,11 @@ void Stars<K>::SetInfluences(const std::vector<Turn>& turns, std::uint32_t first
 // Sets the influences of points on walls by their stars' simplices of faces alone: simplices inside
 // are larger, and no point yields to them.
 template <int K>
-void Stars<K>::MeasureFaces(const std::vector<Turn>& turns, std::uint32_t first) {
+void Stars<K>::MeasureFaces(const std::vector<StarCuts>& turns, std::uint32_t first) {
   const std::vector<std::uint32_t>& boundary = sample_.boundary();
   if (boundary.empty()) return;
   std::vector<std::uint32_t> changed;  // by place in `boundary`
-  for (const Turn& turn : turns) {
+  for (const StarCuts& turn : turns) {
     CheckInterruption(changed.size());
     if (sample_.walls(turn.star) == 0) continue;
     const auto at = std::lower_bound(boundary.begin(), boundary.end(), turn.star);
@@ -493,7 +553,7 @@ typename Stars<K>::Change Stars<K>::Insert(std::uint32_t first,
                                            std::vector<std::uint32_t>* around) {
   Change change;
   const std::vector<StarCut> cuts = BuildNewStars(first);
-  const std::vector<Turn> turns = InTurns(cuts);
+  const std::vector<StarCuts> turns = InTurns(cuts);
   change.stars = ParallelGather<std::uint32_t>(
       turns.size(), [&](std::size_t i, auto* found) { found->push_back(turns[i].star); });
 
@@ -546,7 +606,7 @@ typename Stars<K>::Change Stars<K>::BuildAllInBulk() {
   sample_.Index(BallTree::Halving::kExtent, PartsToCome(K));
   std::vector<double> influence(size());
   const StarBuilder<K> builder = this->builder();
-  BulkStarBuilder<K>(builder).Build(&cells_, influence.data());
+  BulkStarBuilder<K>(builder, *peers_).Build(&cells_, influence.data());
   sample_.tree().SetInfluences(std::move(influence));
   MeasureFaces({}, 0);
   sample_.ForgetBounds();

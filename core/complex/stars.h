@@ -10,10 +10,12 @@
 #include <vector>
 
 #include "core/base/instantiate.h"
+#include "core/base/parcel.h"
 #include "core/complex/blocks.h"
 #include "core/complex/sample.h"
 #include "core/complex/star_builder.h"
 #include "core/geometry/restricted_voronoi_cell.h"
+#include "core/peers.h"
 #include "core/specification.h"
 
 namespace stellate::core {
@@ -38,8 +40,10 @@ class Stars {
   // d        ambient dimension
   // epsilon  the size bound, length: sets the scale of the perturbing weights
   // labels   of an arrangement of walls: a point on walls then has a cell for each of its sectors
-  Stars(int d, double epsilon, const StarOptions& options, LabelTable labels = {})
-      : options_(options), sample_(d, epsilon, std::move(labels)) {}
+  // peers    the parts that build the stars together, each all of them; borrowed
+  Stars(int d, double epsilon, const StarOptions& options, LabelTable labels = {},
+        const Peers& peers = NoPeers())
+      : options_(options), peers_(&peers), sample_(d, epsilon, std::move(labels)) {}
 
   static constexpr std::uint32_t kNone = 0xffffffffu;
 
@@ -84,6 +88,7 @@ class Stars {
   // stars have or had (with repetitions): their simplices may have become inconsistent.
   Change Commit(std::vector<std::uint32_t>* around = nullptr);
 
+  const Peers& peers() const { return *peers_; }
   // Returns the sample, including the points that wait for Commit; all others have stars.
   const Sample<K>& sample() const { return sample_; }
   std::uint32_t size() const { return sample_.size(); }
@@ -175,15 +180,6 @@ class Stars {
                 WallSet walls = 0, const double* conormals = nullptr, WallSet signs = 0) const;
 
  private:
-  // The cuts of one star. Stars are cut in the order of the first new points that cut them.
-  struct Turn {
-    std::uint32_t first, star;  // the first new point that cuts the star
-    std::size_t begin, end;     // its cuts
-    bool operator<(const Turn& other) const {
-      return first != other.first ? first < other.first : star < other.star;
-    }
-  };
-
   StarBuilder<K> builder() const { return {sample_, options_}; }
   // The three ways of Commit.
   Change BuildAllAsAdded();
@@ -191,23 +187,23 @@ class Stars {
   Change Insert(std::uint32_t first, std::vector<std::uint32_t>* around);
   // Their steps.
   std::vector<StarCut> BuildNewStars(std::uint32_t first);
-  static std::vector<Turn> InTurns(const std::vector<StarCut>& cuts);
-  void CutStars(const std::vector<Turn>& turns, const std::vector<StarCut>& cuts,
+  void CutStars(const std::vector<StarCuts>& turns, const std::vector<StarCut>& cuts,
                 std::uint32_t first, Change* change);
-  void SetInfluences(const std::vector<Turn>& turns, std::uint32_t first,
+  void SetInfluences(const std::vector<StarCuts>& turns, std::uint32_t first,
                      const std::vector<double>& influence);
-  void MeasureFaces(const std::vector<Turn>& turns, std::uint32_t first);
+  void MeasureFaces(const std::vector<StarCuts>& turns, std::uint32_t first);
   void NoteSectors(std::uint32_t id);
   Cell& MutableCell(std::uint32_t id, int sector);
+  void UnpackCells(std::uint32_t p, Parcel* parcel);
   std::vector<std::pair<Simplex, int>> OwnedInSectors(std::uint32_t p) const;
   double CutSectors(std::uint32_t p, std::span<const StarCut> cuts,
                     std::vector<std::uint32_t>* added, std::vector<std::uint32_t>* removed);
-  bool IsCutBy(const StarBuilder<K>& builder, std::uint32_t p, const Site& q) const;
   void FindClosing(const double* q, std::uint32_t near, std::vector<std::uint32_t>* ids) const;
   template <typename Visit>
   void ForEachOwned(std::uint32_t p, int sector, const Visit& visit) const;
 
   StarOptions options_;
+  const Peers* peers_;
   bool includes_interior_next_ = false;
   Sample<K> sample_;
   std::vector<std::uint32_t> near_;  // of the points that wait for Commit

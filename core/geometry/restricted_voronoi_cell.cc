@@ -358,6 +358,28 @@ void RestrictedVoronoiCell<K>::Measure() {
                                        [](const Facet& f) { return IsFake(f.id); });
 }
 
+template <int K>
+void RestrictedVoronoiCell<K>::PackTo(std::vector<std::byte>* message) const {
+  PackAll(facets_, message);
+  PackAll(vertices_, message);
+  PackAll(keys_, message);
+  PackAll(centres_, message);
+  Pack(d_, message);
+  Pack(max_norm2_, message);
+  Pack(has_fake_, message);
+}
+
+template <int K>
+void RestrictedVoronoiCell<K>::Unpack(Parcel* parcel) {
+  parcel->UnpackAll(&facets_);
+  parcel->UnpackAll(&vertices_);
+  parcel->UnpackAll(&keys_);
+  parcel->UnpackAll(&centres_);
+  d_ = parcel->Unpack<std::size_t>();
+  max_norm2_ = parcel->Unpack<double>();
+  has_fake_ = parcel->Unpack<bool>();
+}
+
 template class RestrictedVoronoiCell<1>;
 template class RestrictedVoronoiCell<3>;
 template class RestrictedVoronoiCell<4>;

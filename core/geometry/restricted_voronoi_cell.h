@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
+#include "core/base/parcel.h"
 #include "core/base/random.h"
 #include "core/base/vector_ops.h"
 #include "core/geometry/facet_ids.h"
@@ -71,6 +73,10 @@ class RestrictedVoronoiCell {
   // Judges the vertices of a cell that was clipped in T_pM at their common centres, from now on, if
   // `around` has such.
   void Judge(const Surroundings<K>& around);
+
+  // Appends it to a message, and becomes what was packed.
+  void PackTo(std::vector<std::byte>* message) const;
+  void Unpack(Parcel* parcel);
 
   // Whether Clip with these arguments would cut: some vertex violates the half-space.
   bool WouldCut(const double* normal, double offset, const double* step = nullptr) const {

@@ -1,6 +1,7 @@
 #include "core/geometry/restricted_voronoi_polygon.h"
 
 #include <cmath>
+#include <span>
 
 #include "core/geometry/draft_polygon.h"
 #include "core/geometry/half_spaces.h"
@@ -23,6 +24,33 @@ Polygon& Polygon::operator=(const Polygon& other) {
   max_norm2_ = other.max_norm2_;
   has_fake_ = other.has_fake_;
   return *this;
+}
+
+void Polygon::PackTo(std::vector<std::byte>* message) const {
+  Pack(count_, message);
+  Pack(has_fake_, message);
+  Pack(max_norm2_, message);
+  Pack(std::span(corners(), 2 * std::size_t{count_}), message);
+  Pack(std::span(ids(), count_), message);
+  Pack(centres_ ? centres_->d : 0, message);
+  if (!centres_) return;
+  PackAll(centres_->at, message);
+  PackAll(centres_->judged, message);
+}
+
+void Polygon::Unpack(Parcel* parcel) {
+  Resize(parcel->Unpack<Index>());
+  has_fake_ = parcel->Unpack<bool>();
+  max_norm2_ = parcel->Unpack<double>();
+  parcel->Unpack(2 * std::size_t{count_}, corners());
+  parcel->Unpack(count_, ids());
+  const auto d = parcel->Unpack<std::size_t>();
+  centres_.reset();
+  if (d == 0) return;
+  centres_ = std::make_unique<Centres>();
+  centres_->d = d;
+  parcel->UnpackAll(&centres_->at);
+  parcel->UnpackAll(&centres_->judged);
 }
 
 double Polygon::norm2(std::size_t v) const {

@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "core/base/parcel.h"
 #include "core/base/random.h"
 #include "core/base/vector_ops.h"
 #include "core/geometry/surroundings.h"
@@ -41,6 +42,9 @@ class RestrictedVoronoiCell<2> {
   void Take(const DraftPolygon& polygon);
   bool Clip(std::uint32_t id, const double* normal, double offset, Scratch& scratch,
             const Surroundings<2>& around, const double* step = nullptr);
+
+  void PackTo(std::vector<std::byte>* message) const;
+  void Unpack(Parcel* parcel);
 
   bool WouldCut(const double* normal, double offset, const double* step = nullptr) const {
     for (std::size_t v = 0; v < count_; ++v)

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/base/local_maxima.h"
-#include "core/parts/parcel.h"
+#include "core/base/parcel.h"
 #include "core/parts/territory.h"
 
 namespace stellate::core {

@@ -4,7 +4,7 @@
 #include <cstring>
 #include <utility>
 
-#include "core/parts/parcel.h"
+#include "core/base/parcel.h"
 
 namespace stellate::core {
 

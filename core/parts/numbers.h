@@ -5,7 +5,7 @@
 #include <span>
 #include <vector>
 
-#include "core/parts/peers.h"
+#include "core/peers.h"
 
 namespace stellate::core {
 

@@ -2,9 +2,6 @@
 
 namespace stellate::core {
 
-Territory::Territory() {
-  static const Alone alone;
-  peers_ = &alone;
-}
+Territory::Territory() : peers_(&NoPeers()) {}
 
 }  // namespace stellate::core

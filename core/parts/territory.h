@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "core/parts/boxes.h"
-#include "core/parts/peers.h"
+#include "core/peers.h"
 
 namespace stellate::core {
 

@@ -9,6 +9,7 @@
 #include "core/base/parallel_sort.h"
 #include "core/base/power.h"
 #include "core/complex/consistency.h"
+#include "core/parts/share_out.h"
 #include "core/refinement/face_splits.h"
 #include "core/refinement/independent_set.h"
 
@@ -20,6 +21,8 @@ constexpr double kMostGrowth = 4;
 constexpr std::uint64_t kLeastGrowth = 2000;
 // If one star in so many is dirty, consistent simplices are found once for all stars.
 constexpr std::size_t kMostlyDirty = 2;
+// So many stars that follow each other are one part's to judge.
+constexpr std::size_t kSharedStars = 32;
 
 // Returns `ids` in an order in which neighbours follow each other: the cache then has what the
 // tests of the star before have read.
@@ -43,13 +46,13 @@ std::vector<std::uint32_t> InOrderOfPlace(const Stars<K>& stars,
 }  // namespace
 
 template <int K>
-Engine<K>::Engine(const Specification& spec, const ResolvedCriteria& criteria)
+Engine<K>::Engine(const Specification& spec, const ResolvedCriteria& criteria, const Peers& peers)
     : criteria_(criteria),
       asks_flats_(spec.oracle.intersect_flat),
       random_seed_(spec.random_seed),
       max_vertices_(spec.limits.max_vertices),
       stars_(spec.ambient_dimension, criteria.epsilon, {criteria.inradius, criteria.centre_rule},
-             LabelTable(spec.labels, Closures(spec.closures))),
+             LabelTable(spec.labels, Closures(spec.closures)), peers),
       sizes_(criteria),
       boundary_(BoundaryPolicy(spec), Closures(spec.closures)),
       protection_(criteria.shape.protection) {
@@ -150,12 +153,16 @@ std::vector<Target<K>> Engine<K>::GoodPointTargets() {
   const std::vector<std::uint32_t> near = InOrderOfPlace<K>(stars_, dirty);
   std::optional<ConsistentSimplices<K>> consistent;
   if (kMostlyDirty * dirty.size() >= stars_.size()) consistent.emplace(stars_);
-  ParallelFor(dirty.size(), [&](std::size_t i) {
+  const auto judge = [&](std::size_t i) {
     const std::uint32_t p = dirty[near[i]];
     found[near[i]] = WorstSliverOrInconsistent<K>(
         stars_, p, criteria_.shape, sizes_.BoundAt(stars_, p), boundary_.stage(),
         consistent ? consistent->Of(p) : 0, boundary_.left() + 1);
-  });
+  };
+  ShareOut(
+      stars_.peers(), dirty.size(), kSharedStars, judge,
+      [&](std::size_t i, Peers::Bytes* message) { Pack(found[near[i]], message); },
+      [&](std::size_t i, Parcel* parcel) { parcel->Unpack(1, &found[near[i]]); });
   filled_.ForgetResolved();
   if (boundary_.stage() == K &&
       std::any_of(found.begin(), found.end(), [](const auto& v) { return v.has_value(); }))

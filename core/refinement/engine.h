@@ -36,7 +36,9 @@ class Engine {
  public:
   using Change = typename Stars<K>::Change;
 
-  Engine(const Specification& spec, const ResolvedCriteria& criteria);
+  // peers: the parts that compute it together, each all of it; borrowed
+  Engine(const Specification& spec, const ResolvedCriteria& criteria,
+         const Peers& peers = NoPeers());
 
   // Returns a copy for a speculative run, on a surrogate instead of M. `share`: refine to this
   // share of the sizes; 1, or less where sizes are the same everywhere.

@@ -7,6 +7,7 @@
 #include "core/base/parallel.h"
 #include "core/base/vector_ops.h"
 #include "core/boundary/inactive_faces.h"
+#include "core/parts/share_out.h"
 #include "core/rules/count_bad.h"
 #include "core/rules/r5_protection.h"
 
@@ -49,12 +50,23 @@ bool Inserter<K>::Judge() {
   const std::vector<Target<K>>& targets = candidates_.targets;
   best_.assign(targets.size(), 0);
   refined_.assign(targets.size(), {});
-  ParallelFor(targets.size(), [&](std::size_t i) {
+  const auto judge = [&](std::size_t i) {
     if (targets[i].violation.rule >= Rule::kShape)
       best_[i] = BestCandidate(i);
     else
       refined_[i] = JudgeRefined(i);
-  });
+  };
+  // A target is dear, so that few make up a share.
+  ShareOut(
+      to_.stars.peers(), targets.size(), 1, judge,
+      [&](std::size_t i, Peers::Bytes* message) {
+        Pack(best_[i], message);
+        Pack(refined_[i], message);
+      },
+      [&](std::size_t i, Parcel* parcel) {
+        parcel->Unpack(1, &best_[i]);
+        parcel->Unpack(1, &refined_[i]);
+      });
   return std::all_of(refined_.begin(), refined_.end(), [](const RefinedPoint& judged) {
     return !judged.found || judged.near_target;
   });

@@ -30,8 +30,8 @@ Status CheckInParts(const Specification& spec, const QueryBlock& block, const An
 }  // namespace
 
 template <int K>
-MeshingRun<K>::MeshingRun(Specification spec)
-    : spec_(std::move(spec)), scheduler_(spec_, interruption_), mesh_(scheduler_.engine()) {
+MeshingRun<K>::MeshingRun(Specification spec, const Peers& peers)
+    : spec_(std::move(spec)), scheduler_(spec_, interruption_, peers), mesh_(scheduler_.engine()) {
   OpenRound();
 }
 

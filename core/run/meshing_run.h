@@ -20,7 +20,8 @@ namespace stellate::core {
 template <int K>
 class MeshingRun final : public Mesher {
  public:
-  explicit MeshingRun(Specification spec);
+  // `peers` is borrowed.
+  MeshingRun(Specification spec, const Peers& peers);
 
   std::shared_ptr<const QueryBatch> NextBatch() override;
   Expected<MeshDelta> Absorb(const Answers& answers) override;

@@ -26,10 +26,11 @@ std::size_t ClearPointsKept(std::size_t vertices) { return 8 * vertices + 16384;
 }  // namespace
 
 template <int K>
-Scheduler<K>::Scheduler(const Specification& spec, const Interruption& interruption)
+Scheduler<K>::Scheduler(const Specification& spec, const Interruption& interruption,
+                        const Peers& peers)
     : spec_(spec),
       interruption_(interruption),
-      engine_(spec_, Resolve(spec_)),
+      engine_(spec_, Resolve(spec_), peers),
       source_(spec_.oracle,
               {K, spec_.ambient_dimension, kTangentStep * engine_.criteria().epsilon,
                spec_.random_seed, kTangentError * spec_.declared_reach.value_or(INFINITY)}),

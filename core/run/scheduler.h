@@ -8,6 +8,7 @@
 
 #include "core/base/instantiate.h"
 #include "core/base/interruption.h"
+#include "core/peers.h"
 #include "core/query_source.h"
 #include "core/refinement/engine.h"
 #include "core/run/boundary_detector.h"
@@ -70,8 +71,8 @@ struct RunCounts {
 template <int K>
 class Scheduler final : public QuerySource {
  public:
-  // Both are borrowed.
-  Scheduler(const Specification& spec, const Interruption& interruption);
+  // All are borrowed.
+  Scheduler(const Specification& spec, const Interruption& interruption, const Peers& peers);
 
   // Whether `answers`, to the open queries, agree with those to the same queries in an earlier
   // round. If not, they must not be absorbed.

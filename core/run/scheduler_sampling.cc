@@ -24,11 +24,12 @@ void RefineTangents(const Specification& spec, TangentFinder& finder, Engine<K>*
   if (const double* sizes = engine->sizes().given())
     sampled.sizes = Eigen::Map<const Eigen::VectorXd>(sizes, count);
   const Eigen::MatrixXd before = sampled.tangents;
+  const Peers& peers = engine->stars().peers();
   finder.Refine(sampled.points, &sampled.tangents);
   if (sampled.tangents == before) return;
   // Others refer to the engine by its address.
   std::destroy_at(engine);
-  std::construct_at(engine, spec, Resolve(spec));
+  std::construct_at(engine, spec, Resolve(spec), peers);
   for (Eigen::Index c = 0; c < count; ++c) engine->AddToSample(sampled, c);
 }
 

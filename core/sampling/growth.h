@@ -8,11 +8,11 @@
 #include <vector>
 
 #include "core/base/instantiate.h"
+#include "core/base/parcel.h"
 #include "core/base/unset.h"
 #include "core/index/ball_tree.h"
 #include "core/index/runs.h"
 #include "core/parts/numbers.h"
-#include "core/parts/parcel.h"
 #include "core/parts/territory.h"
 #include "core/sampling/lattice.h"
 
@@ -68,6 +68,11 @@ class Growth {
   std::vector<Eigen::Index> Join(const Eigen::MatrixXd& points, const Eigen::MatrixXd& tangents,
                                  const std::vector<std::uint8_t>& found,
                                  const Eigen::VectorXd& shares = {});
+
+  // Of a part: what orders the columns of the last ring among those of all parts, whose numbers of
+  // patches are the same.
+  std::vector<OrderKey> RingKeys() const;
+  std::uint32_t patches() const { return patches_; }
 
   // Frees its memory. Propose returns nothing afterwards.
   void Forget();

@@ -218,6 +218,13 @@ void Growth<K>::ShareFar(const Candidates& candidates, std::vector<std::uint8_t>
     for (Parcel parcel(message); !parcel.is_empty();) (*far)[parcel.Unpack<std::uint32_t>()] = 0;
 }
 
+template <int K>
+std::vector<OrderKey> Growth<K>::RingKeys() const {
+  std::vector<OrderKey> keys(asked_.sites.size());
+  for (std::size_t i = 0; i < keys.size(); ++i) keys[i] = asked_.KeyOf(i);
+  return keys;
+}
+
 // Of sites that all parts have.
 template <int K>
 void Growth<K>::KeepNear(Sites* sites) {
@@ -280,6 +287,7 @@ void Growth<K>::CarryToAll(const std::vector<OrderKey>& keys, Sites sites) {
   template Borders Growth<K>::SharePlaces(Proposed*) const;                                       \
   template Borders Growth<K>::ShareContenders(const Proposed&, Contenders*) const;                \
   template void Growth<K>::ShareFar(const Candidates&, std::vector<std::uint8_t>*) const;         \
+  template std::vector<OrderKey> Growth<K>::RingKeys() const;                                     \
   template void Growth<K>::KeepNear(Sites*);                                                      \
   template void Growth<K>::CarryToAll(const std::vector<OrderKey>&, Sites);
 STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)

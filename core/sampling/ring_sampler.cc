@@ -33,11 +33,13 @@ template <int K>
 RingSampler<K>::RingSampler(Engine<K>& engine, const Specification& spec, double apart)
     : engine_(engine),
       are_drawn_(spec.seeds.cols() == 0),
+      predicts_(!spec.oracle.tangent_basis),
       apart_(apart),
-      growth_(engine.stars().sample().d(), SampleSpacing(K, engine.criteria().epsilon),
-              !spec.oracle.tangent_basis),
-      scouting_(std::make_unique<Growth<K>>(engine.stars().sample().d(), apart_ * growth_.spacing(),
-                                            !spec.oracle.tangent_basis)) {
+      growth_(engine.stars().sample().d(), SampleSpacing(K, engine.criteria().epsilon), predicts_,
+              engine.stars().peers()),
+      scouting_(std::make_unique<SharedGrowth<K>>(engine.stars().sample().d(),
+                                                  apart_ * growth_.spacing(), predicts_,
+                                                  engine.stars().peers())) {
   if (engine.boundary().policy().MeshesFacesFirst()) clearance_.emplace(engine, growth_.spacing());
 }
 
@@ -64,6 +66,17 @@ std::vector<std::uint8_t> RingSampler<K>::Scout(const AnsweredPoints& answers,
   return AddToSample<K>(engine_, answers, columns);
 }
 
+// Where many parts make one mesh, the scouts say how to cut it into boxes of as much to do.
+template <int K>
+void RingSampler<K>::GrowFromScouts() {
+  const Eigen::VectorXd shares = SharesOf(engine_.sizes(), scouts_);
+  if (!predicts_ && shares.size() == 0)
+    growth_.CutUp({{scouts_.points.data(), static_cast<std::size_t>(scouts_.points.size())},
+                   engine_.stars().sample().d(),
+                   engine_.stars().peers().parts()});
+  growth_.Begin(scouts_.points, scouts_.tangents, scouts_.found, 0, shares);
+}
+
 template <int K>
 typename Growth<K>::Ring RingSampler<K>::NextRing() {
   typename Growth<K>::Ring ring;
@@ -71,8 +84,7 @@ typename Growth<K>::Ring RingSampler<K>::NextRing() {
   if (scouting_ && (scouting_->size() > 1 || !are_drawn_)) ring = scouting_->Propose();
   if (scouting_ && ring.points.cols() == 0) {
     scouting_.reset();
-    growth_.Begin(scouts_.points, scouts_.tangents, scouts_.found, 0,
-                  SharesOf(engine_.sizes(), scouts_));
+    GrowFromScouts();
   }
   if (!scouting_) {
     ring = growth_.Propose();

@@ -4,9 +4,9 @@
 #include <optional>
 #include <vector>
 
-#include "core/sampling/growth.h"
 #include "core/sampling/interior_clearance.h"
 #include "core/sampling/sampler.h"
+#include "core/sampling/shared_growth.h"
 
 namespace stellate::core {
 
@@ -32,17 +32,19 @@ class RingSampler final : public Sampler<K> {
   double CountMissing() const override;
 
  private:
-  Growth<K>& growing() { return scouting_ ? *scouting_ : growth_; }
+  SharedGrowth<K>& growing() { return scouting_ ? *scouting_ : growth_; }
   typename Growth<K>::Ring NextRing();
+  void GrowFromScouts();
   AnsweredPoints KeepClear(const AnsweredPoints& answers);
   std::vector<std::uint8_t> Scout(const AnsweredPoints& answers,
                                   const std::vector<Eigen::Index>& columns);
 
   Engine<K>& engine_;
   const bool are_drawn_;  // the seeds, from a box
-  const double apart_;    // patches, in spacings
-  Growth<K> growth_;
-  std::unique_ptr<Growth<K>> scouting_;            // the coarse lattice, until it is complete
+  const bool predicts_;
+  const double apart_;  // patches, in spacings
+  SharedGrowth<K> growth_;
+  std::unique_ptr<SharedGrowth<K>> scouting_;      // the coarse lattice, until it is complete
   AnsweredPoints seeds_, scouts_;                  // as given; of the coarse lattice
   std::optional<InteriorClearance<K>> clearance_;  // between walls
   Eigen::Index proposed_ = 0;                      // points of the last ring

@@ -21,7 +21,9 @@ CORE = {
     "core": ("core/base",),
     "core/index": ("core", "core/base"),
     "core/geometry": ("core", "core/base", "core/index"),
-    "core/complex": _GROUND,
+    # What parts of one mesh tell each other.
+    "core/parts": ("core", "core/base"),
+    "core/complex": (*_GROUND, "core/parts"),
     # What is judged; the complex alone; its shape; what was answered; what follows from all that.
     "core/certificate": ("core", "core/base"),
     "core/certificate/complex": ("core", "core/base"),
@@ -54,9 +56,7 @@ CORE = {
     ),
     "core/boundary": (*_GROUND, "core/complex"),
     "core/rules": (*_GROUND, "core/complex", "core/boundary"),
-    "core/refinement": (*_GROUND, "core/complex", "core/boundary", "core/rules"),
-    # What parts of one mesh tell each other.
-    "core/parts": ("core/base",),
+    "core/refinement": (*_GROUND, "core/parts", "core/complex", "core/boundary", "core/rules"),
     "core/sampling": (*_GROUND, "core/refinement", "core/parts"),
     "core/speculation": (*_GROUND, "core/complex", "core/refinement", "core/sampling"),
     "core/run": (

@@ -20,6 +20,7 @@
 #include <vector>
 
 #include "tests/core/golden/golden_cases.h"
+#include "tests/core/support/thread_peers.h"
 
 namespace stellate::core {
 namespace {
@@ -192,11 +193,11 @@ Subject SubjectOf(const GoldenCase& c) {
 }
 
 // What a run does, round by round, and how it ends.
-std::string Record(const GoldenCase& c, int threads) {
+std::string Record(const GoldenCase& c, int threads, const Peers& peers = NoPeers()) {
   auto [spec, answer] = SubjectOf(c);
   c.change(spec);
   spec.threads = threads;
-  const auto mesher = testing::NewMesher(spec);
+  const auto mesher = std::move(*Mesher::CreatePart(spec, peers));
   std::ostringstream out;
   out << kLegend << (spec.walls > 0 ? kLegendOfWalls : "");
   std::string phase;
@@ -350,6 +351,25 @@ TEST_P(GoldenFiles, TellWhatTheMesherDoes) {
   const std::string one = Record(c, 1);
   ExpectRecorded(c, one);
   EXPECT_EQ(Record(c, 4), one) << "4 threads";
+}
+
+// Parts that share the work tell all of it, each. No part is interrupted.
+TEST_P(GoldenFiles, TellWhatEachPartOfItDoes) {
+  const GoldenCase& c = GetParam();
+  if (c.interrupt_before > 0) return;
+  const std::string whole = Record(c, 1);
+  constexpr std::size_t kMostLines = 300;  // of records that are made once more, by five
+  for (const int parts : {2, 5}) {
+    if (parts > 2 && Lines(whole).size() > kMostLines) continue;
+    testing::ThreadPeers all(parts);
+    std::vector<std::string> records(static_cast<std::size_t>(parts));
+    all.Run([&](const Peers& peers) {
+      records[static_cast<std::size_t>(peers.part())] = Record(c, 1, peers);
+    });
+    for (const std::string& record : records) EXPECT_EQ(record, whole) << parts << " parts";
+    const bool has_stars = whole.find("ended CONVERGED") != std::string::npos;
+    EXPECT_TRUE(!has_stars || all.exchanges() > 0) << "they share nothing";
+  }
 }
 
 std::string NameOf(const ::testing::TestParamInfo<GoldenCase>& tested) { return tested.param.name; }

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "core/parts/peers.h"
+#include "core/peers.h"
 
 namespace stellate::core::testing {
 

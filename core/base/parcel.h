@@ -1,31 +1,38 @@
 #pragma once
 
+#include <cstddef>
 #include <cstring>
 #include <span>
 #include <type_traits>
-
-#include "core/parts/peers.h"
+#include <vector>
 
 namespace stellate::core {
 
 // Appends numbers to a message, as they lie in memory: all parts run the same program.
 template <typename Number>
-void Pack(std::span<const Number> numbers, Peers::Bytes* message) {
+void Pack(std::span<const Number> numbers, std::vector<std::byte>* message) {
   static_assert(std::is_trivially_copyable_v<Number>);
   const auto bytes = std::as_bytes(numbers);
   message->insert(message->end(), bytes.begin(), bytes.end());
 }
 
 template <typename Number>
-void Pack(const Number& number, Peers::Bytes* message) {
+void Pack(const Number& number, std::vector<std::byte>* message) {
   Pack(std::span<const Number>(&number, 1), message);
+}
+
+// With their count.
+template <typename Number>
+void PackAll(const std::vector<Number>& numbers, std::vector<std::byte>* message) {
+  Pack(numbers.size(), message);
+  Pack(std::span<const Number>(numbers), message);
 }
 
 // Reads what was packed, in the same order.
 class Parcel {
  public:
   // The message is borrowed.
-  explicit Parcel(const Peers::Bytes& message) : rest_(message) {}
+  explicit Parcel(const std::vector<std::byte>& message) : rest_(message) {}
 
   bool is_empty() const { return rest_.empty(); }
   // REQUIRES: as many are left
@@ -41,6 +48,12 @@ class Parcel {
     Number number;
     Unpack(1, &number);
     return number;
+  }
+  // What PackAll wrote.
+  template <typename Number>
+  void UnpackAll(std::vector<Number>* numbers) {
+    numbers->resize(Unpack<std::size_t>());
+    Unpack(numbers->size(), numbers->data());
   }
 
  private:

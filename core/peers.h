@@ -2,12 +2,13 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
 namespace stellate::core {
 
-// The parts that make one mesh together, each with a share of space, in one process or in many.
-// All functions wait for the other parts: all parts make the same calls in the same order.
+// The parts that make one mesh together, in one process or in many. All functions wait for the
+// other parts: all parts make the same calls in the same order.
 class Peers {
  public:
   using Bytes = std::vector<std::byte>;
@@ -20,6 +21,12 @@ class Peers {
 
   // Sends each part its bytes, by part. Returns those that each has sent to this one, by part.
   virtual std::vector<Bytes> Exchange(std::vector<Bytes> bytes) const = 0;
+  // Sends all parts the same bytes. Returns those of each, by part, its own among them.
+  virtual std::vector<Bytes> ToAll(Bytes bytes) const {
+    std::vector<Bytes> all(static_cast<std::size_t>(parts()) - 1, bytes);
+    all.push_back(std::move(bytes));
+    return Exchange(std::move(all));
+  }
   // Returns the sum over all parts, and over those before this one.
   struct Sums {
     std::uint64_t all, before;
@@ -35,5 +42,11 @@ class Alone final : public Peers {
   std::vector<Bytes> Exchange(std::vector<Bytes> bytes) const override { return bytes; }
   Sums Sum(std::uint64_t count) const override { return {count, 0}; }
 };
+
+// Of a mesh that is made in one part.
+inline const Peers& NoPeers() {
+  static const Alone alone;
+  return alone;
+}
 
 }  // namespace stellate::core
