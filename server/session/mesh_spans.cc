@@ -49,6 +49,8 @@ bool MeshSpans::Chunk::MattersMoreThan(const Chunk& other) const {
   return done - asked > other.done - other.asked;
 }
 
+MeshSpans::Round::Round() = default;
+
 MeshSpans::MeshSpans(std::shared_ptr<SpanSink> sink, const MeshRequest& request, const char* kind,
                      bool is_resumed)
     : sink_(std::move(sink)),
@@ -178,10 +180,10 @@ std::vector<Span> MeshSpans::ChunkSpans(TimePoint now) {
   return spans;
 }
 
-void MeshSpans::Keep(Chunk chunk) {
+void MeshSpans::Keep(const Chunk& chunk) {
   std::vector<Chunk>& kept = round_->kept;
   const auto matters_more = [](const Chunk& a, const Chunk& b) { return a.MattersMoreThan(b); };
-  kept.push_back(std::move(chunk));
+  kept.push_back(chunk);
   std::push_heap(kept.begin(), kept.end(), matters_more);  // in front: what matters least
   if (kept.size() <= kMostChunks) return;
   std::pop_heap(kept.begin(), kept.end(), matters_more);
@@ -229,11 +231,11 @@ void MeshSpans::OnLeft(WorkerId worker) {
         ++open;
         continue;
       }
-      Chunk chunk = std::move(open->second);
+      Chunk chunk = open->second;
       open = round_->open.erase(open);
       chunk.done = now;
       chunk.outcome = "worker left";
-      Keep(std::move(chunk));
+      Keep(chunk);
     }
   }
   if (worker > kMostWorkers) return;
@@ -271,7 +273,7 @@ void MeshSpans::OnAnswered(LeaseId lease, Dispatch::AcceptResult result) {
   if (!round_) return;
   const auto it = round_->open.find(lease);
   if (it == round_->open.end()) return;
-  Chunk chunk = std::move(it->second);
+  Chunk chunk = it->second;
   round_->open.erase(it);
   chunk.done = Clock::now();
   chunk.outcome = outcome;
@@ -280,7 +282,7 @@ void MeshSpans::OnAnswered(LeaseId lease, Dispatch::AcceptResult result) {
     ++worker->second.chunks;
     worker->second.queries += chunk.queries;
   }
-  Keep(std::move(chunk));
+  Keep(chunk);
 }
 
 }  // namespace stellate::server

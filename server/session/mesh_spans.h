@@ -88,6 +88,8 @@ class MeshSpans final : public PoolFollower {
     std::int64_t chunks = 0, queries = 0;  // answered
   };
   struct Round {
+    Round();
+
     Span span;
     std::vector<Span> steps;
     TimePoint begun, step_begun;
@@ -100,7 +102,7 @@ class MeshSpans final : public PoolFollower {
 
   std::chrono::system_clock::time_point WallTime(TimePoint time) const;
   Span Begun(const char* name, const TraceContext& above, TimePoint start, TimePoint end) const;
-  void Keep(Chunk chunk);                       // (locked)
+  void Keep(const Chunk& chunk);                // (locked)
   std::vector<Span> ChunkSpans(TimePoint now);  // (locked)
   void EndRoundLocked();
 
