@@ -3,6 +3,7 @@
 #   development  libraries, headers, the package for find_package, pkg-config's files
 #   server       stellated
 #   tools        stellate, the command line
+#   mpi          stellate-mpi, with STELLATE_MPI
 include(CMakePackageConfigHelpers)
 include(GNUInstallDirs)
 
@@ -63,4 +64,7 @@ install(
 if(STELLATE_PROGRAMS)
   install(TARGETS stellated RUNTIME COMPONENT server)
   install(TARGETS stellate RUNTIME COMPONENT tools)
+  if(STELLATE_MPI)
+    install(TARGETS stellate-mpi RUNTIME COMPONENT mpi)
+  endif()
 endif()

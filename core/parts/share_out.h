@@ -11,9 +11,9 @@
 
 namespace stellate::core {
 
-// Work on many things that all parts know. Each part does a share, and sends the others what came of
-// it. Things are dealt in stretches, so that neighbours are done together, and no part has all that
-// is dear.
+// Work on many things that all parts know. Each part does a share, and sends the others what came
+// of it. Things are dealt in stretches, so that neighbours are done together, and no part has all
+// that is dear.
 //
 //   ShareOut(peers, count, 16, compute, pack, unpack);
 //

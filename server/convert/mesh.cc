@@ -268,8 +268,10 @@ void ToProto(const std::vector<PastProgress>& past, v1::Mesh* out) {
 }
 
 void ToProto(const Session& session, v1::Mesh* out) {
-  const MeshRequest& request = session.request();
-  const SessionView view = session.View();
+  ToProto(session.request(), session.View(), out);
+}
+
+void ToProto(const MeshRequest& request, const SessionView& view, v1::Mesh* out) {
   out->set_name(request.name);
   if (!request.points) {
     ToProto(request.spec, out->mutable_spec());

@@ -22,6 +22,8 @@ void ToProto(const std::vector<WorkerStats>& workers, v1::Mesh* out);
 void ToProto(const std::vector<PastProgress>& past, v1::Mesh* out);
 // State, progress and report; no geometry, neither the mesh's nor the seeds'.
 void ToProto(const Session& session, v1::Mesh* out);
+// The same of a mesh that no session has.
+void ToProto(const MeshRequest& request, const SessionView& view, v1::Mesh* out);
 // `d`: ambient dimension; `k`: dimension.
 void ToProto(const DeltaPart& part, int k, int d, v1::DeltaChunk* out);
 // For a download: nothing is removed.

@@ -247,6 +247,26 @@ CLIENTS = {
     ),
 }
 
+# The program for MPI jobs: a client and the mesher in one process, whose messages are the wire's.
+MPI = {
+    "mpi": (
+        *FACE,
+        "core/parts",
+        "proto",
+        "clients/cli",
+        "clients/cpp/include",
+        "clients/cpp/mesh",
+        "clients/cpp/run",
+        "clients/cpp/wire",
+        "server/base",
+        "server/config",
+        "server/convert",
+        "server/history",
+        "server/oracles",
+        "server/session",
+    )
+}
+
 # Tests may take what they test, and not more of the house than that.
 EVERY_CORE = tuple(CORE)
 EVERY_CPP = tuple(room for room in CLIENTS if room.startswith("clients/cpp/"))
@@ -262,16 +282,16 @@ TESTS = {
 }
 
 TABLE = Table(
-    rooms={"text": (), "proto": (), **CORE, **SERVER, **CLIENTS, **TESTS},
+    rooms={"text": (), "proto": (), **CORE, **SERVER, **CLIENTS, **MPI, **TESTS},
     foreign={
         # The core is geometry: no clock, no file, no socket, no thread but oneTBB's, no wire.
-        "Eigen/": ("core", "server", "clients/cpp", "tests"),
+        "Eigen/": ("core", "server", "clients/cpp", "mpi", "tests"),
         "tbb/": ("core", "tests/core"),
         "tl/": ("core", "server", "clients/cpp", "tests"),
-        "chrono": ("server", "clients", "tests"),
+        "chrono": ("server", "clients", "mpi", "tests"),
         "filesystem": ("server", "clients", "tests"),
         "fstream": ("server", "clients", "tests"),
-        "iostream": ("server", "clients", "tests"),
+        "iostream": ("server", "clients", "mpi", "tests"),
         "sys/": ("server", "clients", "tests"),
         "unistd.h": ("server", "clients", "tests"),
         # The wire: not where meshes are run, so that this builds and tests without gRPC.
@@ -286,6 +306,7 @@ TABLE = Table(
             "clients/view/gateway",
             "tests",
         ),
+        "mpi.h": ("mpi",),
         "libpq-fe.h": ("server/postgres",),
         "sqlite3.h": ("server/storage", "tests/server"),
         "nanoflann.hpp": ("clients/cpp/oracles",),
@@ -305,6 +326,7 @@ TABLE = Table(
         "clients/cli",
         "clients/conform",
         "clients/python/stellate",
+        "mpi",
     ),
     # Angles, of which only words and figures of the report are made, or a proof with a margin: no
     # question hangs on them.
@@ -324,5 +346,5 @@ TABLE = Table(
             "core/run/ending.cc",
         )
     },
-    acyclic=("core", "text", "server", "clients", "tests"),
+    acyclic=("core", "text", "server", "clients", "mpi", "tests"),
 )

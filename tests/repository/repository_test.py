@@ -89,7 +89,7 @@ class Workflows(unittest.TestCase):
 
     def test_together_they_run_all(self) -> None:
         all_of_it = [script for path in WORKFLOWS for script in scripts(parsed(path))]
-        stages = ("--asan", "--tsan", "--languages", "--packages", "--postgres")
+        stages = ("--asan", "--tsan", "--languages", "--packages", "--postgres", "--mpi")
         for command in (".ci/run", *(f"tests/run {stage}" for stage in stages)):
             self.assertIn(command, all_of_it)
 

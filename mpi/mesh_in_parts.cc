@@ -1,0 +1,217 @@
+#include "mesh_in_parts.h"
+
+#include <algorithm>
+#include <chrono>
+#include <exception>
+#include <memory>
+#include <optional>
+#include <utility>
+
+#include "core/base/parcel.h"
+#include "core/mesher.h"
+#include "mpi_peers.h"
+#include "result.h"
+#include "server/convert/error_map.h"
+#include "server/convert/mesh.h"
+#include "server/convert/spec.h"
+#include "server/session/session.h"
+#include "shared_questions.h"
+#include "wire/convert.h"
+#include "wire/status.h"
+
+namespace stellate::mpi {
+namespace {
+
+using Bytes = core::Peers::Bytes;
+using Clock = std::chrono::steady_clock;
+
+// As many as ids go; the ranks are the user's own.
+constexpr std::uint64_t kMostVertices = 2'000'000'000;
+
+// Has all parts go on, or none: the first part's error that has one.
+Expected<void> Agree(const core::Peers& peers, const Expected<void>& own) {
+  Bytes message;
+  if (!own) {
+    core::Pack(own.error().code, &message);
+    for (const std::string* words : {&own.error().reason, &own.error().message}) {
+      core::Pack(words->size(), &message);
+      core::Pack(std::span<const char>(*words), &message);
+    }
+  }
+  const std::vector<Bytes> all = peers.ToAll(std::move(message));
+  const auto failed =
+      std::find_if(all.begin(), all.end(), [](const Bytes& its) { return !its.empty(); });
+  if (failed == all.end()) return {};
+  core::Parcel parcel(*failed);
+  Error error;
+  error.code = parcel.Unpack<ErrorCode>();
+  for (std::string* words : {&error.reason, &error.message}) {
+    words->resize(parcel.Unpack<std::size_t>());
+    parcel.Unpack(words->size(), words->data());
+  }
+  if (failed != all.begin())
+    error.message = "rank " + std::to_string(failed - all.begin()) + ": " + error.message;
+  return tl::unexpected(std::move(error));
+}
+
+Expected<v1::MeshSpec> Declare(Oracle& oracle, const MeshOptions& options) {
+  if (!options.epsilon.length())
+    return Fail(ErrorCode::kRefused,
+                "epsilon is to be chosen, which takes a server: say how large it is, as "
+                "'stellate doctor' finds it");
+  try {
+    return client::ToSpec(oracle, options);
+  } catch (const std::exception& error) {
+    return Fail(ErrorCode::kOracleFailed, error.what());
+  }
+}
+
+Expected<server::MeshRequest> Read(const v1::MeshSpec& spec) {
+  server::Config config;
+  config.max_vertices = kMostVertices;
+  config.max_coordinates = kMostVertices * core::kMaxAmbientDimension;
+  auto request = server::FromProto(spec, config);
+  if (request) return std::move(*request);
+  return tl::unexpected(client::FromStatus(server::ToGrpc(request.error())));
+}
+
+// What all parts were asked for: they have to be given the same.
+Expected<server::MeshRequest> Settle(Oracle& oracle, const MeshOptions& options,
+                                     const core::Peers& peers) {
+  const Expected<v1::MeshSpec> spec = Declare(oracle, options);
+  Expected<server::MeshRequest> request =
+      spec ? Read(*spec) : Expected<server::MeshRequest>(tl::unexpected(spec.error()));
+  const Expected<void> own =
+      request ? Expected<void>() : Expected<void>(tl::unexpected(request.error()));
+  if (auto agreed = Agree(peers, own); !agreed) return tl::unexpected(agreed.error());
+  const std::string text = spec->SerializeAsString();
+  const auto bytes = std::as_bytes(std::span(text));
+  const std::vector<Bytes> all = peers.ToAll({bytes.begin(), bytes.end()});
+  for (std::size_t part = 1; part < all.size(); ++part)
+    if (all[part] != all[0])
+      return Fail(ErrorCode::kRefused, "rank " + std::to_string(part) +
+                                           " has another manifold than rank 0, or other options: "
+                                           "give all ranks the same");
+  return request;
+}
+
+// One mesh, from its first round to its end.
+class PartRun {
+ public:
+  PartRun(const server::MeshRequest& request, Oracle& oracle, const MeshOptions& options,
+          const core::Peers& peers)
+      : request_(request),
+        options_(options),
+        is_first_(peers.part() == 0),
+        questions_(request.spec, oracle, peers, options.workers, options.max_chunk),
+        peers_(peers) {}
+
+  // The mesh as a server would say it, and its geometry in the first part.
+  Expected<Result> Go() {
+    auto made = core::Mesher::CreatePart(request_.spec, peers_);
+    if (!made) return Fail(ErrorCode::kRefused, made.error().message);
+    core::Mesher& mesher = **made;
+    while (const auto batch = mesher.NextBatch()) Round(mesher, batch);
+    server::SessionView view = ViewOf(mesher);
+    view.report = mesher.report();
+    view.state = StateOf(&view);
+    Result result;
+    server::ToProto(request_, view, &result.mesh);
+    if (view.state == server::SessionState::kFailed)
+      return tl::unexpected(client::WhyFailed(result.mesh));
+    if (is_first_) result.history = HistoryOf(request_, mesher, std::move(walls_));
+    return result;
+  }
+
+ private:
+  void Round(core::Mesher& mesher, const std::shared_ptr<const core::QueryBatch>& batch) {
+    SharedQuestions::Outcome outcome = questions_.Ask(batch);
+    if (outcome.failure) return Stop(mesher, std::move(*outcome.failure));
+    const core::Expected<core::MeshDelta> delta = mesher.Absorb(outcome.answers);
+    if (!delta) return Stop(mesher, server::ToMeshFailure(delta.error()));
+    NoteWalls(*delta);
+    if (!is_first_ || !options_.on_progress) return;
+    v1::Progress progress;
+    server::ToProto(ViewOf(mesher), &progress);
+    options_.on_progress(client::FromProto(progress));
+  }
+
+  void Stop(core::Mesher& mesher, server::MeshFailure failure) {
+    mesher.Fail({core::StatusCode::kOracleFailed, failure.message});
+    failure_ = std::move(failure);
+  }
+
+  void NoteWalls(const core::MeshDelta& delta) {
+    if (!is_first_ || delta.walls.empty()) return;
+    walls_.resize(delta.first_vertex);
+    walls_.insert(walls_.end(), delta.walls.begin(), delta.walls.end());
+  }
+
+  server::SessionView ViewOf(const core::Mesher& mesher) const {
+    server::SessionView view;
+    view.progress = mesher.progress();
+    view.elapsed_seconds = std::chrono::duration<double>(Clock::now() - begun_).count();
+    if (const double done = view.progress.fraction; view.progress.is_foreseeable && done > 0)
+      view.remaining_seconds = view.elapsed_seconds * (1 - done) / done;
+    return view;
+  }
+
+  server::SessionState StateOf(server::SessionView* view) const {
+    view->failure = failure_;
+    switch (view->report->termination) {
+      case core::Termination::kConverged:
+        return server::SessionState::kSucceeded;
+      case core::Termination::kOracleFailed:
+        if (failure_.reason == server::FailureReason::kNone)
+          view->failure = server::ToMeshFailure(view->report->failure);
+        return server::SessionState::kFailed;
+      default:
+        return server::SessionState::kStopped;
+    }
+  }
+
+  const server::MeshRequest& request_;
+  const MeshOptions& options_;
+  const bool is_first_;
+  const SharedQuestions questions_;
+  const core::Peers& peers_;
+  const Clock::time_point begun_ = Clock::now();
+  std::vector<core::WallSet>
+      walls_;  // of the vertices, in the first part; none where none is on any
+  server::MeshFailure failure_;
+};
+
+Expected<void> CheckPaths(const Oracle& oracle, const std::vector<std::string>& paths,
+                          const MeshOptions& options) {
+  const int k = oracle.dimension() - (options.boundary_only.value_or(false) ? 1 : 0);
+  for (const std::string& path : paths)
+    if (auto ok = CheckSave(path, k, oracle.ambient_dimension()); !ok) return ok;
+  return {};
+}
+
+}  // namespace
+
+Expected<SavedMesh> MeshInParts(const Expected<std::unique_ptr<Oracle>>& made,
+                                const std::vector<std::string>& paths, const MeshOptions& options,
+                                MPI_Comm comm) {
+  const MpiPeers peers(comm);
+  const bool is_first = peers.part() == 0;
+  const auto has_oracle = made ? Expected<void>() : tl::unexpected(made.error());
+  if (auto agreed = Agree(peers, has_oracle); !agreed) return tl::unexpected(agreed.error());
+  Oracle& oracle = **made;
+  const auto writable = is_first ? CheckPaths(oracle, paths, options) : Expected<void>();
+  if (auto agreed = Agree(peers, writable); !agreed) return tl::unexpected(agreed.error());
+  Expected<server::MeshRequest> request = Settle(oracle, options, peers);
+  if (!request) return tl::unexpected(request.error());
+  request->spec.threads = ThreadsOfEach(comm);
+  PartRun run(*request, oracle, options, peers);
+  Expected<Result> result = run.Go();
+  if (!result) return tl::unexpected(result.error());
+  Expected<SavedMesh> saved = is_first ? Save(std::move(*result), paths) : SavedMesh{};
+  const Expected<void> own = saved ? Expected<void>() : tl::unexpected(saved.error());
+  if (auto agreed = Agree(peers, own); !agreed) return tl::unexpected(agreed.error());
+  if (!is_first) saved->report = client::ReportOf(result->mesh);
+  return saved;
+}
+
+}  // namespace stellate::mpi

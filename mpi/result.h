@@ -1,0 +1,30 @@
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/mesher.h"
+#include "server/history/mesh_history.h"
+#include "server/session/mesh_request.h"
+#include "stellate/download.h"
+#include "stellate/v1/mesh.pb.h"
+
+namespace stellate::mpi {
+
+// A mesh that is over.
+struct Result {
+  v1::Mesh mesh;                                   // what is said of it, without geometry
+  std::unique_ptr<server::MeshHistory> history{};  // its geometry, where it is to be written
+};
+
+// The geometry of a mesh that is over, in one revision, oriented. `walls`: of each vertex up to the
+// last that is on any.
+std::unique_ptr<server::MeshHistory> HistoryOf(const server::MeshRequest& request,
+                                               const core::Mesher& mesher,
+                                               std::vector<core::WallSet> walls);
+
+// Writes it to files, as DownloadMeshTo does.
+Expected<SavedMesh> Save(Result result, const std::vector<std::string>& paths);
+
+}  // namespace stellate::mpi
