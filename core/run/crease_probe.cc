@@ -43,8 +43,9 @@ constexpr double kVerySharp = 0.03;
 constexpr double kOpposite = -0.95;    // cosine: a side continues in the opposite direction
 constexpr double kParallel = 0.05;     // singular values: directions do not meet
 constexpr double kFarthestCorner = 2;  // of a way's length, from its middle
+constexpr double kFarthestTip = 6;     // ... that of a cone whose sides are 10 degrees off its axis
 
-constexpr Eigen::Index kAsked = 8, kSteps = 4;  // steps, as far each of both
+constexpr Eigen::Index kAsked = 12, kSteps = 4;  // steps, as far each of both
 
 // Returns the unit direction in the span of `of` with the largest angle to the span of `off`, and
 // the sine of that angle.
@@ -56,24 +57,37 @@ std::pair<Eigen::VectorXd, double> FarthestOff(const Eigen::MatrixXd& of,
   return {of * eigen.vectors.col(last), std::sqrt(std::max(eigen.values[last], 0.0))};
 }
 
-// Returns the point where the tangent spaces at both ends are nearest to each other, the one
-// nearest to the middle: between flat sides it is on the crease. Returns the middle if that point
-// is far away.
-Eigen::VectorXd CornerOf(const Way& way) {
-  const Eigen::Index d = way.a.size(), k = way.at_a.cols();
-  const Eigen::VectorXd middle = (way.a + way.b) / 2;
-  Eigen::MatrixXd span(d, 2 * k + 1);
-  span << way.at_a, way.at_b, (way.b - way.a).normalized();
+using TangentSpace = std::pair<Eigen::VectorXd, Eigen::MatrixXd>;  // at a point, its basis
+
+// Returns the point where tangent spaces, at points of M, are nearest to each other, the one that
+// is nearest to `middle`: between flat sides it is on the crease, and it is the tip of a cone, of
+// which there are three or more. Returns `middle` if that point is farther from it than `farthest`.
+Eigen::VectorXd MeetingOf(const std::vector<TangentSpace>& spaces, const Eigen::VectorXd& middle,
+                          double farthest) {
+  const Eigen::Index d = middle.size(), k = spaces.front().second.cols();
+  const auto count = static_cast<Eigen::Index>(spaces.size());
+  Eigen::MatrixXd span(d, count * (k + 1) - 1);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const auto& [point, basis] = spaces[static_cast<std::size_t>(i)];
+    span.middleCols(i * k, k) = basis;
+    if (i > 0) span.col(count * k + i - 1) = (point - spaces.front().first).normalized();
+  }
   const Eigen::MatrixXd basis = PivotedBasis(span, std::min(d, span.cols()));
-  Eigen::MatrixXd off(2 * d, basis.cols());
-  off << basis - way.at_a * (way.at_a.transpose() * basis),
-      basis - way.at_b * (way.at_b.transpose() * basis);
-  Eigen::VectorXd to(2 * d);
-  const Eigen::VectorXd from_a = way.a - middle, from_b = way.b - middle;
-  to << from_a - way.at_a * (way.at_a.transpose() * from_a),
-      from_b - way.at_b * (way.at_b.transpose() * from_b);
+  Eigen::MatrixXd off(count * d, basis.cols());
+  Eigen::VectorXd to(count * d);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const auto& [point, tangent] = spaces[static_cast<std::size_t>(i)];
+    const Eigen::VectorXd from = point - middle;
+    off.middleRows(i * d, d) = basis - tangent * (tangent.transpose() * basis);
+    to.segment(i * d, d) = from - tangent * (tangent.transpose() * from);
+  }
   const Eigen::VectorXd step = basis * ShortestLeastSquares(off, to, kParallel);
-  return step.norm() <= kFarthestCorner * way.length() ? (middle + step).eval() : middle;
+  return step.norm() <= farthest ? (middle + step).eval() : middle;
+}
+
+Eigen::VectorXd CornerOf(const Way& way) {
+  return MeetingOf({{way.a, way.at_a}, {way.b, way.at_b}}, (way.a + way.b) / 2,
+                   kFarthestCorner * way.length());
 }
 
 }  // namespace
@@ -95,6 +109,7 @@ void CreaseProbe::Start(std::vector<Way> ways) {
   walks_.clear();
   crease_.reset();
   unconfirmed_.reset();
+  tip_.reset();
   for (Way& way : ways) {
     Walk walk;
     walk.sine = SineBetween(way.at_a, way.at_b);
@@ -103,14 +118,20 @@ void CreaseProbe::Start(std::vector<Way> ways) {
   }
 }
 
-// Returns points along the way, and around its corner, to both sides along either tangent space.
-Eigen::MatrixXd CreaseProbe::PointsAbout(const Way& way) const {
+// Returns points along the way, around its corner, and around where all the tangent spaces that
+// were found last meet, to both sides along either tangent space.
+Eigen::MatrixXd CreaseProbe::PointsAbout(const Walk& walk) const {
+  const Way& way = walk.way;
   const Eigen::VectorXd step = (way.b - way.a) / 4, corner = CornerOf(way);
+  std::vector<TangentSpace> spaces{{way.a, way.at_a}, {way.b, way.at_b}};
+  for (const Node& node : walk.nodes) spaces.emplace_back(node.point, node.basis);
+  const Eigen::VectorXd tip = MeetingOf(spaces, (way.a + way.b) / 2, kFarthestTip * way.length());
   const Eigen::VectorXd along_a = kAround * way.length() * FarthestOff(way.at_a, way.at_b).first;
   const Eigen::VectorXd along_b = kAround * way.length() * FarthestOff(way.at_b, way.at_a).first;
   Eigen::MatrixXd points(d_, kAsked);
   points << way.a + step, way.a + 2 * step, way.a + 3 * step, corner, corner + along_a,
-      corner - along_a, corner + along_b, corner - along_b;
+      corner - along_a, corner + along_b, corner - along_b, tip + along_a, tip - along_a,
+      tip + along_b, tip - along_b;
   return points;
 }
 
@@ -143,7 +164,7 @@ std::vector<QueryBlock> CreaseProbe::Questions() {
     block.points.resize(d_, kAsked * static_cast<Eigen::Index>(walks_.size()));
     for (std::size_t w = 0; w < walks_.size(); ++w)
       block.points.middleCols(kAsked * static_cast<Eigen::Index>(w), kAsked) =
-          PointsAbout(walks_[w].way);
+          PointsAbout(walks_[w]);
   }
   policy_.AddWishes(&block);
   return {std::move(block)};
@@ -241,6 +262,10 @@ void CreaseProbe::TakeCorner(const AnswerBlock& answer) {
     unconfirmed_.reset();
     return;
   }
+  if (tip_) {
+    unconfirmed_->point = *std::exchange(tip_, std::nullopt);
+    return;
+  }
   unconfirmed_.reset();
   LeaveEnd();
   ChooseEnd();
@@ -331,6 +356,9 @@ std::optional<Crease> CreaseProbe::WhatIsAt(const Walk& walk) {
   crease.crosses = goes_through || stay >= kSteps - 1;
   crease.point = goes_through ? middle : meet;
   turn_ = turn;
+  std::vector<TangentSpace> spaces{{walk.way.a, walk.way.at_a}, {walk.way.b, walk.way.at_b}};
+  for (const Node* side : sides) spaces.emplace_back(side->point, side->basis);
+  tip_ = MeetingOf(spaces, (walk.way.a + walk.way.b) / 2, kFarthestCorner * length);
   return crease;
 }
 

@@ -28,14 +28,14 @@ struct Crease {
   Eigen::VectorXd point;  // on M, or within `length` of it
   double sine = 0;        // of the angle by which they turn
   double length = 0;      // between the two points that show it
-  bool crosses = false;   // M continues on all sides: it crosses itself, without a crease or corner
+  bool crosses = false;   // M continues on all sides: it crosses itself, without a crease or tip
 };
 
 // Tests whether M is smooth where rules keep failing. It starts from ways (pairs of points) along
 // which the tangent spaces turn, and bisects them down to a share of the mesh size. On a smooth M
 // the tangent spaces turn less along shorter ways. If they turn as much, and M is straight on both
-// sides, there is a crease, a corner or a crossing. Queries closest points, and tangents if the
-// oracle gives them.
+// sides, there is a crease, a corner, a tip or a crossing. Queries closest points, and tangents if
+// the oracle gives them.
 //
 //   probe.Start(SteepWaysAtFaults<K>(engine, longest));
 //   // ... drive it as a QuerySource, then:
@@ -75,7 +75,7 @@ class CreaseProbe final : public QuerySource {
     bool ends_early = false, has_ended_early = false;
   };
 
-  Eigen::MatrixXd PointsAbout(const Way& way) const;
+  Eigen::MatrixXd PointsAbout(const Walk& walk) const;
   Eigen::MatrixXd StepsFrom(const Way& way) const;
   Walk& WalkOf(Eigen::Index asked);
   void TakePoints(const AnswerBlock& answer);
@@ -97,10 +97,11 @@ class CreaseProbe final : public QuerySource {
   bool is_difference_ = false;  // asks for tangents of what it has found
   bool looks_beyond_ = false;   // asks what is about the first walk's end
   std::vector<Walk> walks_;
-  std::vector<Eigen::Index> asked_;    // the queries that have an answer
-  Eigen::MatrixXd found_;              // those answers
-  std::optional<Crease> unconfirmed_;  // a query tests whether M reaches its point
-  double turn_ = 0;                    // the sine between its sides
+  std::vector<Eigen::Index> asked_;     // the queries that have an answer
+  Eigen::MatrixXd found_;               // those answers
+  std::optional<Crease> unconfirmed_;   // a query tests whether M reaches its point
+  std::optional<Eigen::VectorXd> tip_;  // where M may reach it otherwise
+  double turn_ = 0;                     // the sine between its sides
   std::optional<Crease> crease_;
 };
 

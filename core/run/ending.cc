@@ -113,10 +113,12 @@ std::string DescribeCrease(const Crease& crease) {
                    ", and it goes on to all sides; no epsilon will do. Change it so that nothing "
                    "crosses there, or cut a ball around that point out of it by a wall");
   return Message(
-      "the manifold has a crease near ", turns,
+      "the manifold has a crease or a tip near ", turns,
       "; no epsilon will do. Round it off, or declare its smooth pieces, which then meet in edges: "
       "where a function is the largest of several (max), these are walls of a solid or "
-      "inequalities; where it is the least (min), those of the outside, cut off by a box");
+      "inequalities; where it is the least (min), those of the outside, cut off by a box. A tip, "
+      "as "
+      "a cone has, is cut away by a wall: g >= 0 outside of a ball around it");
 }
 
 template <int K>

@@ -9,6 +9,7 @@
 #include <cmath>
 #include <cstdio>
 #include <functional>
+#include <numbers>
 #include <string>
 #include <tuple>
 #include <utility>
@@ -241,6 +242,69 @@ Shape CrossingSpheres() {
   return shape;
 }
 
+// A surface of revolution, from the candidates in the half plane of a point, (r, z), each with its
+// normal there; r < 0 is on the other side of the axis.
+struct OfProfile {
+  double r, z, nr, nz;
+};
+Shape Revolved(const std::string& name,
+               std::function<std::vector<OfProfile>(double, double)> profile,
+               const std::vector<double>& tips) {
+  return {name, 2,
+          [profile = std::move(profile)](const Vector3d& x) {
+            const double r = std::hypot(x[0], x[1]);
+            const Vector3d out =
+                r > 0 ? Vector3d(x[0] / r, x[1] / r, 0) : Vector3d(Vector3d::UnitX());
+            std::vector<Candidate> all;
+            for (const OfProfile& c : profile(r, x[2]))
+              all.push_back(
+                  {c.r * out + c.z * Vector3d::UnitZ(), {c.nr * out + c.nz * Vector3d::UnitZ()}});
+            return all;
+          },
+          [tips](const Vector3d& x) {
+            double off = INFINITY;
+            for (const double z : tips) off = std::min(off, (x - z * Vector3d::UnitZ()).norm());
+            return off;
+          }};
+}
+
+// A cone around the unit ball, whose sides are at an angle of `half` degrees to its axis.
+Shape Cone(double half) {
+  const double s = std::sin(half * std::numbers::pi / 180),
+               c = std::cos(half * std::numbers::pi / 180);
+  return Revolved("cone with a tip of " + std::to_string(half),
+                  [s, c](double r, double z) {
+                    const double along =
+                        std::clamp(s * r + c * (1 / s - z), 0.0, c / s);  // from the tip
+                    std::vector<OfProfile> all{{s * along, 1 / s - c * along, c, s}};
+                    const double away = std::hypot(r, z);
+                    if (z <= s * away) all.push_back({r / away, z / away, r / away, z / away});
+                    return all;
+                  },
+                  {1 / s});
+}
+
+// The unit circle about (0.5, 0), revolved: the outer part, with two dimples, the inner part, with
+// two tips, or both, which cross each other there.
+Shape Spindle(bool outer, bool inner) {
+  const double tip = std::sqrt(0.75);
+  return Revolved(outer && inner ? "crossing spindle"
+                  : outer        ? "apple with a tip"
+                                 : "lemon with a tip",
+                  [=](double r, double z) {
+                    std::vector<OfProfile> all;
+                    for (const double centre : {0.5, -0.5}) {
+                      if (!(centre > 0 ? outer : inner)) continue;
+                      const double away = std::hypot(r - centre, z);
+                      const double nr = (r - centre) / away, nz = z / away;
+                      if (centre + nr >= 0) all.push_back({centre + nr, nz, nr, nz});
+                    }
+                    for (const double end : {-tip, tip}) all.push_back({0, end, 0, 1});
+                    return all;
+                  },
+                  {-tip, tip});
+}
+
 class Creases : public ::testing::TestWithParam<std::tuple<Shape, bool>> {};
 
 TEST_P(Creases, EndTheRunSoonWithTheirPlace) {
@@ -255,7 +319,7 @@ TEST_P(Creases, EndTheRunSoonWithTheirPlace) {
       EXPECT_LE(run.report().counts.rounds, 300u);
       const std::string words = HasWords(shape.name, "crossing")
                                     ? "crosses itself or is singular near ("
-                                    : "has a crease near (";
+                                    : "has a crease or a tip near (";
       const std::string& verdict = certificate.verdict;
       const std::size_t at = verdict.find(words);
       ASSERT_NE(at, std::string::npos) << verdict;
@@ -277,7 +341,9 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Combine(::testing::Values(TwoBalls(true, 1), TwoBalls(false, 1), SharpBox(),
                                          BoxWithoutEdges(), Square(), SquareByDifferences(2e-3),
                                          SquareByDifferences(2e-5), BoxByDifferences(2e-3),
-                                         CrossingCircles(), CrossingSpheres()),
+                                         CrossingCircles(), CrossingSpheres(), Cone(30), Cone(45),
+                                         Cone(50), Spindle(true, false), Spindle(false, true),
+                                         Spindle(true, true)),
                        ::testing::Bool()));
 
 // An edge that is rounded by a thousandth of the mesh size, and tubes and gaps far below it.

@@ -5,6 +5,7 @@ import re
 import numpy as np
 import pytest
 import stellate
+from stellate import oracles
 
 BOX = [-1.5] * 3, [1.5] * 3
 
@@ -24,7 +25,7 @@ def test_the_union_of_a_block_and_a_ball_has_creases(server):
         return np.minimum(block, np.linalg.norm(p - [0, 0, 0.6], axis=1) - 0.6)
 
     mesh = stellate.mesh(stellate.oracles.SignedDistance(f, bounding_box=BOX), 0.12, server=server)
-    at = place(mesh.report.certificate.verdict, "has a crease")
+    at = place(mesh.report.certificate.verdict, "has a crease or a tip")
     gaps = np.sort(np.abs(np.abs(at) - half))
     edge = np.hypot(gaps[0], gaps[1])
     seam = np.hypot(at[2] - 0.3, np.hypot(at[0], at[1]) - np.sqrt(0.27))
@@ -53,7 +54,7 @@ def test_a_square_has_corners_however_fine_its_mesh(server, epsilon):
         bounding_box=([-2, -2], [2, 2]),
     )
     mesh = stellate.mesh(square, epsilon, server=server)
-    at = place(mesh.report.certificate.verdict, "has a crease")
+    at = place(mesh.report.certificate.verdict, "has a crease or a tip")
     np.testing.assert_allclose(np.sort(np.abs(at)), [0, 1], atol=1e-4)
 
 
@@ -67,7 +68,7 @@ def test_a_curve_with_kinks_is_not_called_too_coarse(server, epsilon):
         f, ambient_dimension=5, dimension=1, bounding_box=([-2] * 5, [2] * 5)
     )
     mesh = stellate.mesh(curve, epsilon, server=server)
-    at = place(mesh.report.certificate.verdict, "has a crease")
+    at = place(mesh.report.certificate.verdict, "has a crease or a tip")
     np.testing.assert_allclose([abs(at[0]), *at[[1, 2, 4]]], [1, 0, 0, 0], atol=1e-4)
 
 
@@ -98,7 +99,37 @@ def test_edges_of_a_maximum_are_named_at_any_epsilon(f, epsilon, server):
     oracle = stellate.ImplicitManifold(f, ambient_dimension=3, dimension=2, bounding_box=BOX)
     verdict = stellate.mesh(oracle, epsilon, server=server).report.certificate.verdict
     assert "smaller epsilon" not in verdict
-    assert off_the_edge(f, place(verdict, "has a crease")) < 1e-3, verdict
+    assert off_the_edge(f, place(verdict, "has a crease or a tip")) < 1e-3, verdict
+
+
+def drop(x):
+    return np.hypot(x[:, 0], x[:, 1]) - x[:, 2] * np.sqrt(np.clip(1 - x[:, 2], 0, None))
+
+
+def both_cones(x):
+    return x[:, 0] ** 2 + x[:, 1] ** 2 - x[:, 2] ** 2
+
+
+def ding_dong(x):
+    return x[:, 0] ** 2 + x[:, 1] ** 2 - (1 - x[:, 2]) * x[:, 2] ** 2
+
+
+@pytest.mark.parametrize(
+    "f, wall, words",
+    [
+        (drop, None, "has a crease or a tip"),
+        (both_cones, lambda x: 1 - (x**2).sum(axis=1), "crosses itself or is singular"),
+        (ding_dong, lambda x: x[:, 2] + 1, "crosses itself or is singular"),
+    ],
+)
+def test_the_tip_of_a_cone_is_named(f, wall, words, server):
+    """Tangent spaces at two points of a cone meet in a line, which leads elsewhere."""
+    oracle = stellate.ImplicitManifold(f, ambient_dimension=3, dimension=2, bounding_box=BOX)
+    if wall:
+        oracle = oracles.Clipped(oracle, [wall])
+    verdict = stellate.mesh(oracle, 0.1, server=server).report.certificate.verdict
+    assert "smaller epsilon" not in verdict
+    assert np.linalg.norm(place(verdict, words)) < 1e-3, verdict
 
 
 def test_a_root_ends_on_the_manifold(server):
