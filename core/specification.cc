@@ -6,6 +6,7 @@
 #include <numbers>
 #include <string>
 
+#include "core/base/instantiate.h"
 #include "core/base/message.h"
 #include "core/field_status.h"
 #include "core/label_table.h"
@@ -27,9 +28,17 @@ Status CheckDimensions(const Specification& spec) {
                            " but must be at least 1: set it to the dimension of the manifold"));
   }
   if (k > kMaxDimension) {
-    return TooLarge("dimension", Message("dimension (k) is ", k,
-                                         " but this build meshes manifolds of ", "dimension up to ",
-                                         kMaxDimension, ": mesh a manifold of lower dimension"));
+    return TooLarge("dimension",
+                    Message("dimension (k) is ", k, " but manifolds of dimension up to ",
+                            kMaxDimension, " are meshed: mesh a manifold of lower dimension"));
+  }
+  if (k > LargestDimension()) {
+    return TooLarge(
+        "dimension",
+        Message("dimension (k) is ", k, " but this build meshes manifolds of dimension ", "up to ",
+                LargestDimension(), ", to compile sooner: ",
+                "build it with STELLATE_HIGH_DIMENSIONS=ON, as clients/quickstart --all ",
+                "and cmake --preset release do"));
   }
   if (d > kMaxAmbientDimension) {
     return TooLarge(
@@ -347,6 +356,8 @@ Status CheckLimits(const Specification& spec) {
 }
 
 }  // namespace
+
+int LargestDimension() { return STELLATE_LARGEST_DIMENSION; }
 
 Status Validate(const Specification& spec) {
   Status status = CheckDimensions(spec);

@@ -10,7 +10,7 @@
 
 namespace stellate::core {
 
-inline constexpr int kMaxDimension = 5;            // largest k this build carries a template for
+inline constexpr int kMaxDimension = 5;            // largest k of any build
 inline constexpr int kMaxAmbientDimension = 4096;  // largest d; servers may set less
 inline constexpr int kDefaultBoxSeeds = 100;       // points drawn from the box when none are given
 
@@ -158,5 +158,8 @@ Eigen::MatrixXd CoverOfBox(const Specification& spec);
 
 // Returns kInvalidArgument or kLimitExceeded with the offending field and value, else Ok.
 Status Validate(const Specification& spec);
+
+// The largest k that this build meshes: kMaxDimension, or 3 without STELLATE_HIGH_DIMENSIONS.
+int LargestDimension();
 
 }  // namespace stellate::core

@@ -7,6 +7,7 @@
 #include <map>
 #include <optional>
 
+#include "core/base/instantiate.h"
 #include "core/base/parallel.h"
 #include "core/base/parallel_sort.h"
 #include "core/complex/cavity_census.h"
@@ -381,10 +382,9 @@ FilledCavities FillCavities(const Stars<K>& stars, const FillingRules& rules) {
   return result;
 }
 
-template FilledCavities FillCavities<1>(const Stars<1>&, const FillingRules&);
-template FilledCavities FillCavities<2>(const Stars<2>&, const FillingRules&);
-template FilledCavities FillCavities<3>(const Stars<3>&, const FillingRules&);
-template FilledCavities FillCavities<4>(const Stars<4>&, const FillingRules&);
-template FilledCavities FillCavities<5>(const Stars<5>&, const FillingRules&);
+#define STELLATE_EACH(K) \
+  template FilledCavities FillCavities<K>(const Stars<K>&, const FillingRules&);
+STELLATE_INSTANTIATE_FUNCTIONS(STELLATE_EACH)
+#undef STELLATE_EACH
 
 }  // namespace stellate::core

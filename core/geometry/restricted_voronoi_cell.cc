@@ -383,6 +383,6 @@ void RestrictedVoronoiCell<K>::Unpack(Parcel* parcel) {
 template class RestrictedVoronoiCell<1>;
 template class RestrictedVoronoiCell<3>;
 template class RestrictedVoronoiCell<4>;
-template class RestrictedVoronoiCell<5>;
+STELLATE_ABOVE_3(template class RestrictedVoronoiCell<5>;)
 
 }  // namespace stellate::core

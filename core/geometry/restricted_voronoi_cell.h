@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/base/instantiate.h"
 #include "core/base/parcel.h"
 #include "core/base/random.h"
 #include "core/base/vector_ops.h"
@@ -184,8 +185,8 @@ void RestrictedVoronoiCell<3>::Take(const DraftPolytope& polytope);
 
 extern template class RestrictedVoronoiCell<1>;
 extern template class RestrictedVoronoiCell<3>;
-extern template class RestrictedVoronoiCell<4>;
-extern template class RestrictedVoronoiCell<5>;
+extern template class RestrictedVoronoiCell<4>;  // of 3-manifolds, too: their weighted stars
+STELLATE_ABOVE_3(extern template class RestrictedVoronoiCell<5>;)
 
 // Returns the walls that vertex v of a cell is on.
 template <int K>

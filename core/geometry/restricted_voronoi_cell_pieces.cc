@@ -65,6 +65,6 @@ bool RestrictedVoronoiCell<K>::Tidy(Scratch& scratch) const {
 template bool RestrictedVoronoiCell<1>::Tidy(Scratch&) const;
 template bool RestrictedVoronoiCell<3>::Tidy(Scratch&) const;
 template bool RestrictedVoronoiCell<4>::Tidy(Scratch&) const;
-template bool RestrictedVoronoiCell<5>::Tidy(Scratch&) const;
+STELLATE_ABOVE_3(template bool RestrictedVoronoiCell<5>::Tidy(Scratch&) const;)
 
 }  // namespace stellate::core

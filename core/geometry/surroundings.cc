@@ -2,6 +2,8 @@
 
 #include <cmath>
 
+#include "core/base/instantiate.h"
+
 namespace stellate::core {
 
 template <int K>
@@ -26,6 +28,6 @@ template double FakeHalfSpace<1>(int, double, double*);
 template double FakeHalfSpace<2>(int, double, double*);
 template double FakeHalfSpace<3>(int, double, double*);
 template double FakeHalfSpace<4>(int, double, double*);
-template double FakeHalfSpace<5>(int, double, double*);
+STELLATE_ABOVE_3(template double FakeHalfSpace<5>(int, double, double*);)
 
 }  // namespace stellate::core

@@ -44,7 +44,7 @@ struct Config {
   // Of each mesh.
   std::uint64_t max_vertices = 10'000'000;
   std::uint64_t max_coordinates = std::uint64_t{1} << 30;  // vertices x d
-  int max_dimension = core::kMaxDimension;
+  int max_dimension = core::LargestDimension();
   int max_ambient_dimension = core::kMaxAmbientDimension;
   std::uint64_t max_rounds = 100'000;
   std::uint64_t max_workers = 64;

@@ -43,7 +43,7 @@ Refused ReadDimensions(const Spec& spec, const Config& config, core::Specificati
   Status status = ToInt(spec.dimension(), "dimension", &out->dimension);
   if (!status.ok()) return status;
   // What no server of this build can do, core::Validate says.
-  if (out->dimension > config.max_dimension && out->dimension <= core::kMaxDimension) {
+  if (out->dimension > config.max_dimension && out->dimension <= core::LargestDimension()) {
     return TooLarge("dimension", "max-dimension", config.max_dimension,
                     Message("dimension (k) is ", out->dimension, " but this server allows ",
                             config.max_dimension, ": raise --max-dimension"));

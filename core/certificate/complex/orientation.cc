@@ -7,6 +7,7 @@
 #include <span>
 #include <utility>
 
+#include "core/base/instantiate.h"
 #include "core/base/parallel.h"
 #include "core/certificate/complex/facets.h"
 #include "core/certificate/complex/signed_forest.h"

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/base/first_ids.h"
+#include "core/base/instantiate.h"
 #include "core/base/message.h"
 #include "core/base/parallel.h"
 #include "core/certificate/complex/facets.h"

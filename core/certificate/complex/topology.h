@@ -3,7 +3,6 @@
 #include <cstdint>
 #include <span>
 #include <string>
-#include <type_traits>
 #include <vector>
 
 #include "core/specification.h"
@@ -25,24 +24,6 @@ struct SimplexList {
 // Returns "" if the list is well formed: whole simplices, ids ascending and below `vertices`, fewer
 // than 2^32 - 2 simplices. Else says in plain words which simplex is not.
 std::string CheckSimplexList(const SimplexList& list);
-
-// Returns call(std::integral_constant<int, k>()), k = 1 to kMaxDimension: makes k a constant.
-template <typename Call>
-auto WithMeshDimension(int k, const Call& call) {
-  static_assert(kMaxDimension == 5);
-  switch (k) {
-    case 1:
-      return call(std::integral_constant<int, 1>());
-    case 2:
-      return call(std::integral_constant<int, 2>());
-    case 3:
-      return call(std::integral_constant<int, 3>());
-    case 4:
-      return call(std::integral_constant<int, 4>());
-    default:
-      return call(std::integral_constant<int, 5>());
-  }
-}
 
 // Lists the simplices that meet at each vertex. Takes 4 (k + 1) bytes per simplex and 8 per vertex.
 //

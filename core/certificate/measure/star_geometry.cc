@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/base/first_ids.h"
+#include "core/base/instantiate.h"
 #include "core/base/parallel.h"
 #include "core/certificate/measure/star_measurer.h"
 #include "core/report.h"
