@@ -24,6 +24,7 @@ MANIFOLDS = {
     "solid": ["--solid", "box(-1,1) - cylinder(x, .5)", "-e", ".35"],
     "materials": ["--material", "a=ball(1)", "--material", "b=ball(.5)", "-e", ".3"],
     "boundary": ["--solid", "ball(1) - ball(.5, at=(1,0,0))", "-e", ".25", "--boundary-only"],
+    "command": ["--oracle-command", f"perl {ROOT}/clients/pipe/torus.pl", "-e", ".1"],
     "not_certified": ["torus:1:0.4", "-e", ".05", "--max-vertices", "500"],
 }
 
@@ -58,14 +59,6 @@ def test_several_files_of_any_format(tmp_path: Path) -> None:
         written.append({name: (tmp_path / folder / name).read_bytes() for name in names})
     for name in names:
         assert written[0][name] == written[1][name], name
-
-
-def test_an_oracle_command_gives_one_mesh_for_any_number_of_ranks(tmp_path: Path) -> None:
-    asked = ["--oracle-command", f"perl {ROOT}/clients/pipe/torus.pl", "-e", ".1"]
-    files = [tmp_path / f"{count}.vtu" for count in (1, 2, 4)]
-    for count, file in zip((1, 2, 4), files, strict=True):
-        assert job(count, *asked, "-o", file).returncode == 0
-    assert len({file.read_bytes() for file in files}) == 1
 
 
 def test_a_report_for_people_comes_once() -> None:

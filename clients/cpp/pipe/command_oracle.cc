@@ -155,7 +155,6 @@ class CommandOracle final : public Oracle {
   }
 
   Eigen::MatrixXd TangentBasis(const Eigen::MatrixXd& points) override {
-    wants_tangents_ = true;
     return AskAllFound({dimension(), points}, "tangents").tangents;
   }
 
@@ -184,11 +183,12 @@ class CommandOracle final : public Oracle {
         question.points, {}, {}, {}, Eigen::MatrixXd(walls(), 0), Eigen::MatrixXd(conormals, 0)};
   }
 
-  // What has been asked for once beside the points is asked for along with them from then on: one
-  // batch instead of two.
+  // Tangent bases come along with every answer, from the first: at points that a command found it
+  // may round them otherwise, and the mesh would depend on which command answers what first. Sizes,
+  // which few meshes need, do once they were asked for: one batch instead of two.
   Answer Ask(Question question) {
     if (question.points.cols() == 0) return Nothing(question);
-    question.tangents = greeting_.tangents && wants_tangents_;
+    question.tangents = greeting_.tangents;
     question.sizes = greeting_.sizes && wants_sizes_;
     question.walls = greeting_.walls;
     std::unique_ptr<Speaker> speaker = Take();
@@ -292,7 +292,7 @@ class CommandOracle final : public Oracle {
   CommandOptions options_;
   const StopSignal stop_;
   Greeting greeting_;
-  std::atomic<bool> wants_tangents_ = false, wants_sizes_ = false;
+  std::atomic<bool> wants_sizes_ = false;
   std::mutex mutex_;
   std::condition_variable wake_;
   std::deque<std::unique_ptr<Speaker>> idle_;
