@@ -150,6 +150,9 @@ class Running(unittest.TestCase):
             with self.subTest(text), self.assertRaises(Wrong):
                 self.check(kind, text)
 
+    def test_a_target_that_an_option_adds_is_known_without_it(self) -> None:
+        self.check("bash", "cmake --build build/release --target stellate-mpi\n")
+
     def test_what_is_to_be_built_first_is_missed(self) -> None:
         """A page that begins with nothing built has only what its own commands build."""
         with tempfile.TemporaryDirectory() as folder:
