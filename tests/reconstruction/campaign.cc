@@ -15,6 +15,7 @@
 #include <ctime>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "core/reconstruction.h"
@@ -44,29 +45,10 @@ struct Kind {
 
 std::vector<Kind> GoodKinds() {
   std::vector<Kind> kinds;
-  const auto add = [&](const char* manifold, std::uint32_t points, double noise) {
-    for (const bool even : {true, false}) {
-      Kind kind;
-      kind.sample.manifold = manifold;
-      kind.sample.points = points;
-      kind.sample.even = even;
-      kind.sample.noise = noise;
-      char text[80];
-      std::snprintf(text, sizeof(text), "%s %s, noise %g", manifold, even ? "even" : "uniform",
-                    noise);
-      kind.name = text;
-      kinds.push_back(kind);
-    }
-  };
-  for (const double noise : {0.0, .1, .2, .4}) {
-    add("circle", 200, noise);
-    add("knot", 400, noise);
-    for (const char* manifold : {"s2", "torus", "t2", "klein"}) add(manifold, 1500, noise);
-  }
-  for (const double noise : {0.0, .1, .2}) {
-    add("s3", 2000, noise);
-    add("so3", 2500, noise);
-    add("t3", 6000, noise);
+  for (stellate::testing::NamedRequest& named : stellate::testing::GoodSamples()) {
+    Kind& kind = kinds.emplace_back();
+    kind.name = std::move(named.name);
+    kind.sample = std::move(named.request);
   }
   return kinds;
 }

@@ -4,6 +4,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <cstdio>
 #include <functional>
 #include <numbers>
 #include <random>
@@ -255,6 +256,34 @@ Sample Draw(const SampleRequest& request) {
       sample.points(c, i * (n / std::max<Index>(1, outliers))) =
           low[c] + (high[c] - low[c]) * drawer.Uniform();
   return sample;
+}
+
+std::vector<NamedRequest> GoodSamples() {
+  std::vector<NamedRequest> samples;
+  const auto add = [&](const char* manifold, std::uint32_t points, double noise) {
+    for (const bool even : {true, false}) {
+      SampleRequest request;
+      request.manifold = manifold;
+      request.points = points;
+      request.even = even;
+      request.noise = noise;
+      char name[80];
+      std::snprintf(name, sizeof(name), "%s %s, noise %g", manifold, even ? "even" : "uniform",
+                    noise);
+      samples.push_back({name, request});
+    }
+  };
+  for (const double noise : {0.0, .1, .2, .4}) {
+    add("circle", 200, noise);
+    add("knot", 400, noise);
+    for (const char* manifold : {"s2", "torus", "t2", "klein"}) add(manifold, 1500, noise);
+  }
+  for (const double noise : {0.0, .1, .2}) {
+    add("s3", 2000, noise);
+    add("so3", 2500, noise);
+    add("t3", 6000, noise);
+  }
+  return samples;
 }
 
 }  // namespace stellate::testing

@@ -38,4 +38,14 @@ struct SampleRequest {
 
 Sample Draw(const SampleRequest& request);
 
+// A kind of sample, as a table names it.
+struct NamedRequest {
+  std::string name;
+  SampleRequest request;
+};
+
+// What is asked to come out right: circles and knots, surfaces and 3-manifolds, even and uniform,
+// with a noise of up to 0.4 spacings, and up to 0.2 at k = 3.
+std::vector<NamedRequest> GoodSamples();
+
 }  // namespace stellate::testing
