@@ -35,13 +35,21 @@ void Add(CLI::App* to, const MeshSetting& setting, MeshOptions* options) {
 }  // namespace
 
 SpecOptions::SpecOptions(CLI::App* command, bool serves) {
-  command
-      ->add_option_function<std::string>(
-          "-e,--epsilon", [this](const std::string& text) { SetEpsilon(text); },
-          "largest circumradius of a simplex, a length; or auto: a quarter of the reach that "
-          "'stellate doctor' finds")
-      ->type_name("FLOAT|auto")
-      ->required();
+  const CLI::Option* const epsilon =
+      command
+          ->add_option_function<std::string>(
+              "-e,--epsilon", [this](const std::string& text) { SetEpsilon(text); },
+              "largest circumradius of a simplex, a length; or auto: a quarter of the reach that "
+              "'stellate doctor' finds")
+          ->type_name("FLOAT|auto REQUIRED");
+  // CLI11 would say only that it is required.
+  command->final_callback([epsilon] {
+    if (epsilon->count() == 0)
+      throw CLI::RequiredError(
+          "--epsilon is required: the largest circumradius of a simplex, a length; or "
+          "--epsilon auto, which takes a quarter of the reach that the oracle's answers show",
+          CLI::ExitCodes::RequiredError);
+  });
   for (const MeshSetting& setting : RunSettings()) Add(command, setting, &options);
   if (serves) {
     for (const MeshSetting& setting : ServingSettings()) Add(command, setting, &options);

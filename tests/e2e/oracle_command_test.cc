@@ -214,6 +214,8 @@ TEST_F(OracleCommand, UsageIsChecked) {
            {"mesh -e 0.2 TORUS -o a.wkt", "wkt"},
            {"serve TORUS", "mesh is required"},
            {"declare torus", "--epsilon is required"},
+           {"mesh torus", "or --epsilon auto, which takes a quarter of the reach"},
+           {"mesh torus -o a.vtu", "--epsilon auto"},
            {"declare torus -e 0.3 --workers 2", "--workers"},
            {"declare torus -e 0.3 --label x --epsilon -1", "epsilon"},
        }) {
