@@ -311,8 +311,9 @@ class Mesh:
         .vtu  k <= 3. When d > 3 the points are the first three coordinates, and all of them are the
               point data "coordinates". Its field data are "epsilon", "certified" (0 or 1),
               "verdict" and "version" (UTF-8 bytes), and "groups": the groups' names, a line each.
-        .vtk, as .vtu, and .avs .bdf .cgns .dat .dato .e .exo .f3grid .fem .h5m .hmf .inp .mdpa .med
-        .mesh .meshb .nas .post .su2 .tec .vol .xdmf .xmf .xml, d <= 3, by meshio. Of a mesh
+        .nas, .bdf, .fem  k, d <= 3: Nastran bulk data, without faces; regions are properties.
+        .vtk, as .vtu, and .avs .cgns .dat .dato .e .exo .f3grid .h5m .hmf .inp .mdpa .med .mesh
+        .meshb .post .su2 .tec .vol .xdmf .xmf .xml, d <= 3, by meshio. Of a mesh
         with boundary part.xdmf has a part_facets.xdmf beside it, as FEniCS reads them: cells with
         "region", facets with "wall", a wall's number plus 1; of two coordinates where d = 2.
 

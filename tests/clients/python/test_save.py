@@ -174,7 +174,7 @@ def test_off_of_any_dimension(tmp_path):
         (shapes.simplex_boundary(4), "m.vtu", "dimension 4"),
         (shapes.simplex_boundary(4), "m.msh", "dimension 3 at most.*known for it: .txt .npz$"),
         (shapes.polygon(5), "m.stl", "surfaces"),
-        (shapes.polygon(5), "m.bdf", "solids"),
+        (shapes.polygon(5), "m.su2", "solids"),
         (shapes.torus(), "m.wkt", "no format"),
         (shapes.torus(), "m.docx", r"\.docx.*known for this mesh: .*\.vtu"),
         (shapes.torus(), "m", "no format"),
@@ -221,9 +221,30 @@ def test_what_is_written_is_read_back(ending, mesh, tmp_path):
         order = [int(np.abs(space - p).sum(axis=1).argmin()) for p in again.points]
         assert np.allclose(again.points, space[order], rtol=0, atol=1e-6)
         cells = np.array(order)[cells]
+    elif ending in (".bdf", ".fem", ".nas"):  # numbers have 16 columns
+        assert np.allclose(again.points, space, rtol=1e-9, atol=0)
     else:
         assert np.array_equal(again.points, space)
     assert {tuple(row) for row in np.sort(cells, axis=1)} == {tuple(row) for row in mesh.simplices}
+
+
+def test_nastran_has_as_many_digits_as_fit_and_regions_as_properties(tmp_path):
+    points = np.array(
+        [
+            [-0.17355349564702321, 1e-300, 1.0],
+            [-1.2345678901234567e-12, -1e6 / 3, 0.0],
+            [1e22, -5e-324, 123456789.123456789],
+            [0.1, -0.0, 7.0],
+        ]
+    )
+    mesh = stellate.Mesh(points, np.array([[0, 1, 2], [1, 2, 3]]), labels=np.array([1, 2]))
+    mesh.save(tmp_path / "m.nas")
+    text = (tmp_path / "m.nas").read_text()
+    assert max(map(len, text.splitlines())) <= 73
+    shells = [line.split() for line in text.splitlines() if line.startswith("CTRIA3")]
+    assert [row[:3] for row in shells] == [["CTRIA3", "1", "1"], ["CTRIA3", "2", "2"]]
+    again = meshio.read(tmp_path / "m.nas")
+    assert np.allclose(again.points, points, rtol=1e-8, atol=0)
 
 
 def test_obj_of_a_solid_is_its_boundary_by_walls(tmp_path):

@@ -14,7 +14,7 @@ import numpy as np
 
 from .._complex import Complex
 from ..errors import SaveError
-from . import glb, layouts, meshio_formats, npz, three_mf
+from . import glb, layouts, meshio_formats, nastran, npz, three_mf
 from .groups import Group, groups
 from .ply import PlyWriter
 from .spool import Spool
@@ -318,6 +318,10 @@ def _glb(mesh: Complex) -> bytes:
     return glb.contents(mesh, cells(mesh))
 
 
+def _nastran(mesh: Complex) -> bytes:
+    return nastran.contents(mesh, cells(mesh))
+
+
 _LOW = "curves and surfaces"
 _SOLIDS = "and the surfaces of solids in space"
 _CELLULAR = "simplices of dimension 3 at most"
@@ -339,6 +343,10 @@ _FORMATS = {
     ".msh": _Format(1, 3, 3, _CELLULAR, layout=layouts.msh),
     ".vtu": _Format(1, 3, _ANY, _CELLULAR, is_vtu=True),
     ".npz": _Format(0, _ANY, _ANY, "anything", contents=npz.contents),
+    **{
+        ending: _Format(1, 3, 3, _CELLULAR, contents=_nastran)
+        for ending in (".bdf", ".fem", ".nas")
+    },
     **{
         ending: _Format(
             form.least_dimension,
