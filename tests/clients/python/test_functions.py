@@ -1,5 +1,6 @@
 """Functions that users write: how they are called, what they may return, how exact they have to be."""
 
+import contextlib
 import pickle
 
 import numpy as np
@@ -377,6 +378,39 @@ def test_the_equation_that_touches_zero_is_named():
 def test_a_cube_is_flat_where_it_is_zero():
     with pytest.raises(stellate.OracleError, match="f is flat where it is zero"):
         ask(implicit(lambda x: sphere(x) ** 3))
+
+
+def small_torus(x):
+    return ((np.sqrt(norm2(x[:, :2])) - 1) ** 2 + x[:, 2] ** 2 - 0.16)[:, None]
+
+
+HALVES = [1e3, 1e4, 1e5, 1e6, 1e7]
+
+
+def in_a_box_of(half, f):
+    oracle = stellate.ImplicitManifold(
+        f, ambient_dimension=3, dimension=2, bounding_box=([-half] * 3, [half] * 3)
+    )
+    oracle.closest_point(np.random.default_rng(1).uniform(-half, half, (20, 3)))
+
+
+@pytest.mark.parametrize("half", HALVES)
+def test_an_equation_is_not_called_flat_because_its_box_is_far_too_large(half):
+    if half < 1e5:
+        with contextlib.suppress(stellate.NotConverged):
+            in_a_box_of(half, small_torus)
+        return
+    with pytest.raises(stellate.OracleError, match="the box is far too large.*near") as caught:
+        in_a_box_of(half, small_torus)
+    place = str(caught.value).split("near [")[1].split("]")[0]
+    x = np.array([[float(c) for c in place.split(",")]])
+    assert abs(small_torus(x)) < 0.01
+
+
+@pytest.mark.parametrize("half", HALVES[:3])
+def test_a_cube_is_called_flat_in_a_large_box(half):
+    with pytest.raises(stellate.OracleError, match="f is flat where it is zero"):
+        in_a_box_of(half, lambda x: small_torus(x) ** 3)
 
 
 PASSING = {

@@ -174,6 +174,26 @@ def test_what_was_not_measured_is_told_with_its_place(make):
     make(np.ma.masked_array(values, mask=False))
 
 
+def test_a_sheet_that_smoothing_takes_away_is_told_with_a_level_that_keeps_it():
+    sheet = np.abs(ball(24, 8.0)) < 0.6  # a voxel
+    with pytest.raises(stellate.InvalidArgument, match=r"thinner than some three.*level=") as told:
+        OfVolume(sheet, smooth=1.5)
+    level = float(str(told.value).split("level=")[1].split(",")[0])
+    OfVolume(sheet, smooth=1.5, level=level)
+
+
+@pytest.mark.parametrize("spacing", [1.0, (0.5, 0.5, 2.0), 1e-3, 1e3])
+def test_a_smoothed_mask_is_not_said_to_have_a_wrong_derivative(spacing):
+    """It is constant to rounding where it is far from the surface."""
+    z, y, x = lattice(48)
+    sides = np.broadcast_to(spacing, (3,))
+    oracle = OfVolume(z * z + y * y + x * x < 150, spacing=spacing, smooth=1.5 * sides.min())
+    lower, upper = oracle.bounding_box
+    random = np.random.default_rng(3)
+    for _ in range(12):
+        closest(oracle, lower + random.random((100, 3)) * (upper - lower))
+
+
 def test_smoothing_by_too_many_voxels_is_told():
     spacing = 0.05
     with pytest.raises(stellate.InvalidArgument, match=r"is a length.*40 voxels.*smooth=0.075"):

@@ -15,6 +15,8 @@ from ._implicit import ImplicitManifold
 
 Border = Literal["closed", "open"]
 
+_MANY_VOXELS = 2  # a standard deviation that is most likely a length in another unit
+
 
 class SignedDistance(ImplicitManifold):
     """The zero set of a signed distance, or of any smooth function with a gradient that is not zero
@@ -149,13 +151,26 @@ class SignedDistance(ImplicitManifold):
         if smooth > 0:
             sharp, volume = volume, smoothed(volume, smooth / sides)
             if sharp.min() < level < sharp.max() and not volume.min() < level < volume.max():
-                raise InvalidArgument(
-                    f"smooth={smooth:g} leaves nothing of the level {level:g}: it is a length, in the unit of "
-                    f"spacing, and here {float((smooth / sides).max()):.3g} voxels. Some 1.5 voxels, "
-                    f"smooth={1.5 * float(sides.max()):.4g}, do for a mask"
-                )
+                raise InvalidArgument(_leaves_nothing(smooth, sides, volume, level))
         box = lower, lower + sides * (np.array(volume.shape) - 1)
         oracle = cls.of_grid(volume, box, level=level, border=border)
         if smooth > 0:
             oracle.about += f", smoothed by {smooth:.6g}"
         return oracle
+
+
+def _leaves_nothing(smooth: float, sides: Array, smoothed: Array, level: float) -> str:
+    """That smoothing a volume of that spacing (d,) leaves no set of the level, and what to do."""
+    voxels = float((smooth / sides).max())
+    text = f"smooth={smooth:g} leaves nothing of the level {level:g}: it is "
+    if voxels > _MANY_VOXELS:
+        return text + (
+            f"a length, in the unit of spacing, and here {voxels:.3g} voxels. Some 1.5 voxels, "
+            f"smooth={1.5 * float(sides.max()):.4g}, do for a mask"
+        )
+    least, most = float(smoothed.min()), float(smoothed.max())
+    return text + (
+        f"{voxels:.3g} voxels, and what the level bounds is thinner than some three of them. Smoothed values lie "
+        f"between {least:.3g} and {most:.3g}: take a level between these, as level={(least + most) / 2:.3g}, which "
+        "bounds a thicker part, or a volume of finer voxels"
+    )

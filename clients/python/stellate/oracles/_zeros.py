@@ -12,7 +12,11 @@ from ._nearest import normal_step
 _LOOKS = 64  # points that F is looked at from where none leads to M
 _FEW = 0.25  # of the first batch, fewer of which find M where something is wrong with F
 _ZERO = 1e-6  # of what F is usually, where solvers that find no zero come to one
-_FLAT = 1e-2  # of how steep F is usually, where it is flat
+_FLAT = 1e-2  # of how steep F is usually, where it may be flat
+# Steps of Newton's near a zero, by differences over a share of the last one. One leaves next to nothing
+# of F where it is not flat, and of a p-th power (1 - 1/p)^p, from 0.25 on.
+_POLISHES, _OVER, _LEFT = 60, 1e-3, 0.05
+_UNLIKE = 0.5  # share of a Jacobian
 _AROUND = (1e-3, 1e-5, 1e-7, 1e-9)  # of the box, how far around a zero a sign is looked for
 # Halvings of a line between two signs, and the last ends' distance in shares of it. What values differ by
 # there is, in that of their difference over a further one, as much where f is steep without end.
@@ -22,6 +26,7 @@ _SAME = 1e-6  # the sine of an angle between gradients of equations that say the
 # Batches with points that are not found in which derivatives are looked at, and points of each.
 _BATCHES, _POINTS = 8, 16
 _STEP = 1e-6  # of the box, of the differences beside which they are put
+_ROUNDED = 64  # times the rounding of F, at the most what a value errs by
 _OFF, _TIMES_BENT = (
     1e-3,
     10,
@@ -72,7 +77,9 @@ class Doubts:
             bent = norms(ahead - behind)
             off = norms(said - seen)
             usual = norms(seen)
-            told = np.isfinite(usual) & (usual > 0) & (bent <= _OFF * usual)
+            # Where F hardly changes over the step its rounding is all that differences show.
+            rounding = _ROUNDED * np.finfo(float).eps * np.abs(values).max(axis=2) / step
+            told = np.isfinite(usual) & (_OFF * usual > rounding) & (bent <= _OFF * usual)
             wrong = told & ~(off <= np.maximum(_OFF * usual, _TIMES_BENT * bent))
         rows, some = wrong.any(axis=1), told.any(axis=1)
         if not rows.any() or rows.sum() < some.sum() / 2:
@@ -175,13 +182,14 @@ class Doubts:
         least = np.abs(values) <= _ZERO * np.nanmedian(before, axis=0)
         if not usable.any() or not least[usable].all(axis=1).mean() > 0.5:
             return  # where F is zero is found, or it is zero nowhere
-        row = int(np.flatnonzero(usable & least.all(axis=1))[0])
-        kept = self._keeps_a_sign(y[row : row + 1]) & (not changes)
+        near = y[int(np.flatnonzero(usable & least.all(axis=1))[0])]
+        zero, slopes = self._polished(near)
+        kept = self._keeps_a_sign(zero[None]) & (not changes)
         for number, keeps in enumerate(kept):
             if keeps:
                 which = "f" if len(kept) == 1 else f"f's value {number}"
                 raise OracleError(
-                    f"{which} touches zero without changing its sign, as near {y[row].tolist()}: |f| is "
+                    f"{which} touches zero without changing its sign, as near {zero.tolist()}: |f| is "
                     "least there, as a square is, or a distance without a sign, and its gradient is zero "
                     "or has none. Give what is squared, or a signed distance",
                     "ORACLE_TOUCHES_ZERO",
@@ -189,11 +197,49 @@ class Doubts:
         steep = [np.abs(self._equations.jacobian(x)).max(axis=(1, 2)) for x in (starts, y[usable])]
         if not np.nanmedian(steep[1]) <= _FLAT * np.nanmedian(steep[0]):
             return
+        if slopes is not None:  # F is steeper elsewhere, as in a box that is far too large
+            self._insist_on_differences(zero, slopes)
+            return
         raise OracleError(
-            f"f is flat where it is zero, as near {y[row].tolist()}: its gradient vanishes with it, as a "
+            f"f is flat where it is zero, as near {zero.tolist()}: its gradient vanishes with it, as a "
             "cube's does. Give what is raised to a power",
             "ORACLE_TOUCHES_ZERO",
         )
+
+    def _insist_on_differences(self, zero: Array, slopes: Array) -> None:
+        """Raises: OracleError where F's Jacobian at a point (d,) is not what it is seen to be, (m, d), as
+        the differences that are a share of the box are longer than M is large."""
+        known = self._equations.jacobian(zero[None])[0]
+        if np.abs(known - slopes).max() <= _UNLIKE * np.abs(slopes).max():
+            return
+        raise OracleError(
+            f"the box is far too large: f is zero near {zero.tolist()}, where differences of f over a share of the "
+            f"box, which is {self._scale:.6g} across, are not its derivatives. Give a box that holds the manifold "
+            "more closely, a thousand times its size at most",
+            "ORACLE_DERIVATIVE",
+        )
+
+    def _polished(self, zero: Array) -> tuple[Array, Array | None]:
+        """(d,), which may be as far off as a box that is far too large allows -> a zero near it, and
+        F's Jacobian there (m, d), or None where F is flat."""
+        d = len(zero)
+        step, least = _ZERO * self._scale, 1e-13 * float(np.abs(zero).max())
+        for _ in range(_POLISHES):
+            h = max(_OVER * step, least)
+            around = zero + h * np.concatenate([np.zeros((1, d)), np.eye(d), -np.eye(d)])
+            values = self._equations.values(around)
+            slopes = (values[1 : d + 1] - values[d + 1 :]).T / (2 * h)
+            if not np.isfinite(slopes).all() or not values[0].any():
+                break
+            way = np.linalg.pinv(slopes, rcond=1e-14) @ values[0]
+            step = float(np.linalg.norm(way))
+            left = np.abs(self._equations.values((zero - way)[None])[0]).max()
+            if not left < np.abs(values[0]).max():
+                break
+            zero = zero - way
+            if left <= _LEFT * np.abs(values[0]).max():
+                return zero, slopes
+        return zero, None
 
 
 def _listed(row: Array) -> str:
