@@ -135,10 +135,14 @@ std::string CertifiedBoundary(int k, const Certificate& certificate) {
 }
 
 std::string DescribeManifold(int k, bool has_boundary, const Certificate& certificate) {
-  const std::uint64_t components = certificate.components;
+  const std::uint64_t components = certificate.components, pinched = certificate.pinched_vertices;
+  const std::string except =
+      pinched == 0 ? ""
+                   : Message(", except at ", pinched, pinched == 1 ? " vertex" : " vertices",
+                             " where it, or a region of it, touches itself,");
   return Message(has_boundary ? "a compact " : "a closed ",
                  certificate.orientable ? "orientable" : "non-orientable",
-                 " manifold of dimension ", k, " with ", components,
+                 " manifold of dimension ", k, except, " with ", components,
                  components == 1 ? " component" : " components", " and Euler characteristic ",
                  certificate.euler_characteristic, DescribeRegions(certificate, "in"),
                  has_boundary ? DescribeBoundary(k, certificate) : "");

@@ -29,6 +29,8 @@ constexpr double kLikelyError = 1e-3;
 // In epsilon: corners of a solid this near each other, or nearer, were seen to keep runs from
 // ending.
 constexpr double kNearlyMeet = 0.25;
+// In the reach seen: of a run that has not ended by then, M may have none there.
+constexpr double kMayHaveNone = 20;
 // In radii of a wall's curvature: no mesh with such an epsilon is certified, or likely to end.
 constexpr double kMuchTooCoarse = 2;
 // The least cosine, that of 37 degrees, of the angle from a wall's normal at which a step is taken
@@ -100,7 +102,12 @@ void DescribeUnfinished(const Engine<K>& engine, double epsilon, bool is_smooth,
                   Message("near vertex ", narrowest, " at ",
                           NamePoint(Eigen::Map<const Eigen::VectorXd>(
                               stars.sample().Point(narrowest), stars.sample().d())))) +
-        ".");
+        (epsilon > kMayHaveNone * reach
+             ? Message(". If finer meshes find ever less reach near there, no epsilon will do: the "
+                       "manifold has a cusp or touches itself, which a ball around that place, cut "
+                       "out of it by a wall, takes away, or its points are noisy, or it is not ",
+                       K, "-dimensional.")
+             : "."));
 }
 
 std::string DescribeCrease(const Crease& crease) {

@@ -117,7 +117,10 @@ void AddTopology(const v1::Certificate& c, bool of_points, Entries* entries) {
       c.links_are_spheres() ? Message("every link a sphere ", ends ? "or a ball " : "", "(decided ",
                                       c.links_decided_exactly() ? "exactly)" : "by homology)")
                             : Grouped(c.bad_links()) + " links are not spheres";
-  entries->Add("manifold", Message(closed, "; ", links));
+  const bool is_pinched = c.links_are_spheres() && c.pinched_vertices() > 0;
+  entries->Add("manifold",
+               Message(closed, "; ", links,
+                       is_pinched ? ", but where it is pinched, of each part alone" : ""));
   // Of a boundary alone stars are not looked at, and of points no flats.
   if (c.certified() && c.fibre_samples() == 0 && !of_points) return;
   std::string stars = Message(Grouped(c.inconsistent_simplices()), " inconsistent simplices, ",

@@ -222,6 +222,11 @@ TEST(Arrangements, PinchedRegionsAreMeshedAndCalledSo) {
     EXPECT_GE(on_both, 2u);
     ASSERT_FALSE(certificate.warnings.empty());
     EXPECT_NE(certificate.warnings.front().find("Pinched at "), std::string::npos);
+    // It is no manifold there, and the verdict does not say so.
+    EXPECT_NE(
+        certificate.verdict.find("except at " + std::to_string(on_both) + " vertices where it"),
+        std::string::npos)
+        << certificate.verdict;
     EXPECT_EQ(testing::EulerOf(mesh->regions.at(1)), d == 2 ? 0 : 2);
   }
 }

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include "tests/core/support/in_process_run.h"
 #include "tests/core/support/unit_sphere.h"
 
@@ -34,6 +36,20 @@ TEST(Ending, TellsTheReachThatNeighboursShow) {
   ASSERT_EQ(certificate.warnings.size(), 1u);
   EXPECT_TRUE(Says(certificate.warnings[0], "times the estimated reach"));
   EXPECT_TRUE(Says(certificate.warnings[0], "which was seen near vertex ")) << "there is where";
+}
+
+// A cusp and two sheets that touch show as little reach as the mesh is fine there, and an epsilon
+// that is a share of it would find less again.
+TEST(Ending, DoesNotSwearThatASmallerEpsilonHelpsWhereThereMayBeNoReach) {
+  Engine<2> engine = EngineOnSphere(SphereSpec(0.2), Octahedron());
+  for (std::uint64_t round = 1; round < 6; ++round) ASSERT_TRUE(StepOnSphere(&engine, round));
+  for (const auto& [epsilon, doubts] : {std::pair{10.0, false}, {30.0, true}}) {
+    Certificate certificate;
+    DescribeUnfinished<2>(engine, epsilon, true, &certificate);
+    ASSERT_EQ(certificate.warnings.size(), 1u);
+    EXPECT_TRUE(Says(certificate.warnings[0], "take epsilon at most"));
+    EXPECT_EQ(Says(certificate.warnings[0], "no epsilon will do: the manifold has a cusp"), doubts);
+  }
 }
 
 TEST(Ending, AsksWhetherItIsAManifoldAtAllWhereNoStarCloses) {

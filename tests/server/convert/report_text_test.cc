@@ -107,10 +107,12 @@ TEST(ReportText, NamesRegionsAndTellsWhereTheyTouchThemselves) {
   face->set_label_below(1);
   face->set_label_above(2);
   report.mutable_certificate()->set_pinched_vertices(12);
+  report.mutable_certificate()->set_links_are_spheres(true);
   const std::string text = ReportText(report, 2, {"", "grain"});
   EXPECT_TRUE(Says(text, "region  label 1: 1,000 simplices, volume 0.5"));
   EXPECT_TRUE(Says(text, "region  label 2 (grain): 2,000 simplices, volume 0.5"));
   EXPECT_TRUE(Says(text, "interface  wall 6, between 1 and 2 (grain): "));
+  EXPECT_TRUE(Says(text, "where it is pinched, of each part alone"));
   EXPECT_TRUE(Says(text, "pinched  at 12 vertices, where the manifold or a region touches itself"));
 }
 
