@@ -148,6 +148,14 @@ TEST_F(PointFiles, WhatIsWrongIsRefusedWithTheLine) {
   EXPECT_THROW(ReadPoints(folder_ / "missing.txt"), std::invalid_argument);
 }
 
+// They have been read as twice as many coordinates.
+TEST_F(PointFiles, DecimalCommasAreRefused) {
+  for (const char* const text : {"1,5 2,5 3,5\n4,5 5,5 6,5\n", "x y\n1,5\t-2,5\n", "1,5 2 3,25\n"})
+    EXPECT_THAT(Refusal(".txt", text), HasSubstr("commas inside of numbers")) << text;
+  for (const char* const text : {"1,5,2\n", "1, 5, 2\n", "1 ,5 ,2\n", "1.5 2.5\n", "1,\t5\n"})
+    EXPECT_EQ(Refusal(".csv", text), "it was read") << text;
+}
+
 TEST_F(PointFiles, NumpysThatAreWrongAreRefused) {
   const std::string good = Npy<double>("<f8", false, std::endian::little, kPoints);
   EXPECT_THAT(Refusal(".npy", "no numpy"), HasSubstr("does not begin"));

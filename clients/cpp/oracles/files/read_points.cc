@@ -29,9 +29,35 @@ bool HasOthersThanXyz(const std::vector<std::string_view>& titles) {
   return titles.size() > 3 && is_titled('x') && is_titled('y') && is_titled('z');
 }
 
+// A comma between digits, where other numbers on the line are apart by blanks alone.
+bool HasDecimalComma(const std::vector<std::string_view>& words) {
+  bool has = false;
+  for (const std::string_view word : words) {
+    const size_t comma = word.find(',');
+    if (comma == std::string_view::npos) continue;
+    const std::string_view whole = word.substr(0, comma), share = word.substr(comma + 1);
+    double ignored = 0;
+    if (!pipe::ParseNumber(whole, &ignored) || !pipe::ParseNumber(share, &ignored)) return false;
+    has = true;
+  }
+  return has && words.size() > 1;
+}
+
+// Commas are between numbers: with those inside of them a file has twice the columns.
+void RefuseDecimalCommas(std::string_view text) {
+  Lines lines(text, '#');
+  for (int line = 0; line < 2 && lines.Next(); ++line) {  // the first may be titles
+    if (HasDecimalComma(lines.words()))
+      lines.Refuse("'" + std::string(lines.words().front()) + " " + std::string(lines.words()[1]) +
+                   "' has commas inside of numbers, or not between all of them: write 1.5 for "
+                   "1,5, and one comma, or a blank, between numbers");
+  }
+}
+
 }  // namespace
 
 Eigen::MatrixXd ParsePointText(std::string text, bool all) {
+  RefuseDecimalCommas(text);
   std::replace(text.begin(), text.end(), ',', ' ');
   Lines lines(text, '#');
   std::vector<double> numbers;
