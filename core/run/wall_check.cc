@@ -12,6 +12,10 @@
 namespace stellate::core {
 namespace {
 
+constexpr const char* kOrTooSmall =
+    ". Or the wall bends within that step, about a void or a piece far smaller than epsilon: leave "
+    "it out of the wall, or take epsilon smaller than it";
+
 constexpr int kPointsOfWall = 4;
 // Conormals turned by 0.2 radians did no harm in trials; turned by 0.3 they did.
 constexpr double kTangentOfMostTurned = 0.2027100355086725;
@@ -72,7 +76,8 @@ Status WallCheck::Judge(const AnsweredPoints& answers) const {
               Message(where, " does not end the manifold: a step of ", Brief(step_),
                       " out of it, along its conormal, has a clearance of ", Brief(clearance(out)),
                       ", which is inside; points of a face are where its walls are 0, and the "
-                      "clearances are negative beyond")};
+                      "clearances are negative beyond",
+                      kOrTooSmall)};
     if (turned)
       return {StatusCode::kOracleBadConormal,
               Message("the conormal of ", where,
@@ -80,7 +85,8 @@ Status WallCheck::Judge(const AnsweredPoints& answers) const {
                       "beside it, a step of ", Brief(step_),
                       " along the wall and a fifth of that inward, is beyond the wall. It must be "
                       "the outward unit normal of the wall within the tangent space: the direction "
-                      "in which the wall's value falls")};
+                      "in which the wall's value falls",
+                      kOrTooSmall)};
   }
   return Status::Ok();
 }

@@ -82,7 +82,8 @@ std::string WhyNothingInside(const Specification& spec, const AnsweredPoints& an
                    ". Move the box there, or enlarge it");
   return Message("the walls leave nothing of the manifold: all ", found,
                  " closest points of the seeds lie beyond a wall. Is a wall's sign inverted? What "
-                 "is inside has clearances >= 0");
+                 "is inside has clearances >= 0. Or is it empty, a single point, or too small for "
+                 "any seed to fall into? Give a seed inside of it");
 }
 
 }  // namespace stellate::core

@@ -99,7 +99,24 @@ TEST(BadWallsTest, WallsThatLeaveNothingAreRefused) {
   Domain m = stellate::testing::Hemisphere();
   m.walls = {stellate::testing::HalfSpaceOf(Eigen::Vector3d::UnitZ(), -5)};
   ExpectFailure(ReportOf(m, 0.3, [](const QueryBlock&, AnswerBlock*) {}), StatusCode::kNoSeeds,
-                "leave nothing of the manifold");
+                "a single point, or too small for any seed");
+}
+
+// Their conormals are right.
+TEST(BadWallsTest, PiecesFarSmallerThanEpsilonAreNotCalledAWrongConormalAlone) {
+  for (const bool is_void : {false, true}) {
+    Domain m = stellate::testing::Ball();
+    const auto tiny = stellate::testing::BallOf(Eigen::Vector3d::Zero(), 1e-3, is_void ? 1 : -1, 3);
+    if (is_void)
+      m.walls.push_back(tiny);
+    else
+      m.walls = {tiny};
+    const Report report = ReportOf(m, 0.3, [](const QueryBlock&, AnswerBlock*) {});
+    EXPECT_EQ(report.termination, Termination::kOracleFailed) << report.certificate.verdict;
+    EXPECT_NE(report.failure.message.find("a void or a piece far smaller than epsilon"),
+              std::string::npos)
+        << report.failure.message;
+  }
 }
 
 // Walls may be the sides of the box: the refusal says that the manifold lies beside it. The tilted
