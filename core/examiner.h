@@ -95,7 +95,8 @@ struct OracleFault {
 // to M; the dimension; tangent bases; sizes; walls; intersections with flats; smoothness; the
 // reach, and whether epsilon suits it; the number of components; speed. Reads no clock.
 // Deterministic: the specification and the answers determine the queries and all findings, except
-// those about speed.
+// those about speed. No QuerySource: it takes answers that no one has checked, the time that they
+// took, and that there are none.
 class Examiner {
  public:
   // Of a specification: its dimensions, capabilities, walls, box, seeds and random_seed. It need

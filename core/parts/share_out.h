@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <span>
 #include <utility>
@@ -19,7 +20,8 @@ namespace stellate::core {
 //
 // compute(i) does thing i, in parallel, as in ParallelFor. Then, one after the other, pack(i,
 // &message) writes what came of it, and unpack(i, &parcel) takes that where another part did it.
-// One part alone computes, and no more. REQUIRES: what comes of a thing hangs on no other
+// One part alone computes, and no more. REQUIRES: what comes of a thing depends on no other
+// that is shared out with it.
 template <typename Compute, typename PackOne, typename UnpackOne>
 void ShareOut(const Peers& peers, std::size_t count, std::size_t stretch, const Compute& compute,
               const PackOne& pack, const UnpackOne& unpack) {

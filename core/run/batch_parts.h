@@ -8,7 +8,8 @@
 namespace stellate::core {
 
 // Cuts a round's batch into parts, if the client bounds the size of a batch, and joins their
-// answers. The mesh does not depend on the cut.
+// answers. The mesh does not depend on the cut. No QuerySource: the last part stays open until the
+// joined answers are accepted.
 //
 //   BatchParts parts(spec, batch, most);
 //   while (!parts.is_last()) parts.Take(answers to parts.part());

@@ -10,7 +10,8 @@
 namespace stellate::core {
 
 // Queries the closest points of a few answers again: a closest-point map must leave points of M
-// where they are, with the same sizes.
+// where they are, with the same sizes. No QuerySource: its block joins a round that is not its own,
+// and it can refuse the answers before that round takes them.
 //
 //   check.Sample(answers);                                  // of the first round
 //   batch.blocks.push_back(check.Questions());              // in a later one, as the last block

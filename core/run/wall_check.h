@@ -10,7 +10,8 @@ namespace stellate::core {
 
 // Checks whether the answers about walls agree with those about M, by a few points of each wall:
 // they must be on M and on the wall, and their conormals must point outward, with a harmless error.
-// Only the signs of clearances are used.
+// Only the signs of clearances are used. No QuerySource: its points are the candidates of one
+// RoundTrip.
 //
 //   const Eigen::MatrixXd points = check.Questions(answers);  // then their closest points on M^:
 //   Status status = check.Judge(answers to points);

@@ -16,7 +16,8 @@ class Surrogate;
 //   sampler->Begin(seeds);
 //   while ((candidates = sampler->Next(round)).size() > 0) sampler->Take(candidates, answers);
 //
-// SamplerFor (core/run/sampler_choice.h) chooses one.
+// SamplerFor (core/run/sampler_choice.h) chooses one. No QuerySource: it names candidates, and the
+// RoundTrip that queries them finds flats and tangents for any oracle.
 template <int K>
 class Sampler {
  public:

@@ -16,7 +16,8 @@ namespace stellate::core {
 // nearest to the centre is inside, the ball through y, of radius |y - p|^2 / (2 n.(y - p)), is
 // smaller and touches M at both p and y, so its radius bounds the reach. This finds both curvature
 // and bottlenecks between sheets. All balls take their steps together. A ball is final once M
-// enters it by no more than two hundredths of its radius.
+// enters it by no more than two hundredths of its radius. No QuerySource: its centres are one block
+// of a Certifier's round, which also measures the oracle's error that its answers are judged by.
 //
 //   ShrinkingBalls balls(mesh, longest_edge);
 //   balls.AddLargest(random_seed, count);
