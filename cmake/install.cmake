@@ -3,7 +3,7 @@
 #   development  libraries, headers, the package for find_package, pkg-config's files
 #   server       stellated
 #   tools        stellate, the command line
-#   mpi          stellate-mpi, with STELLATE_MPI
+#   mpi          stellate-mpi, with STELLATE_MPI; its library and header are of development
 include(CMakePackageConfigHelpers)
 include(GNUInstallDirs)
 
@@ -66,5 +66,9 @@ if(STELLATE_PROGRAMS)
   install(TARGETS stellate RUNTIME COMPONENT tools)
   if(STELLATE_MPI)
     install(TARGETS stellate-mpi RUNTIME COMPONENT mpi)
+    stellate_export(mpi stellate_mpi=mpi stellate_convert=convert stellate_session=session
+      stellate_server_base=server_base stellate_text=text)
+    install(FILES mpi/include/stellate/mpi.h DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/stellate
+      COMPONENT development)
   endif()
 endif()

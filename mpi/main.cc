@@ -68,7 +68,7 @@ class PartCommand {
                               "--worker-wait, --answer and --busy are for servers: ranks wait for "
                               "each other as long as it takes");
     const Expected<SavedMesh> mesh =
-        stellate::mpi::MeshInParts(oracle, outputs_.paths(), spec_.options, MPI_COMM_WORLD);
+        stellate::mpi::MeshInPartsTo(oracle, outputs_.paths(), spec_.options, MPI_COMM_WORLD);
     bar.Clear();
     if (mesh) {
       if (is_first) return report_.Write(mesh->report, mesh->report.text, mesh->failures);

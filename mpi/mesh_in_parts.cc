@@ -11,6 +11,7 @@
 #include "core/mesher.h"
 #include "mpi_peers.h"
 #include "result.h"
+#include "run/scaled.h"
 #include "server/convert/error_map.h"
 #include "server/convert/mesh.h"
 #include "server/convert/spec.h"
@@ -98,20 +99,28 @@ Expected<server::MeshRequest> Settle(Oracle& oracle, const MeshOptions& options,
 // One mesh, from its first round to its end.
 class PartRun {
  public:
+  // keeps_geometry: whether this part is to have the mesh's geometry in the end.
   PartRun(const server::MeshRequest& request, Oracle& oracle, const MeshOptions& options,
-          const core::Peers& peers)
+          const core::Peers& peers, bool keeps_geometry)
       : request_(request),
         options_(options),
-        is_first_(peers.part() == 0),
+        keeps_geometry_(keeps_geometry),
         questions_(request.spec, oracle, peers, options.workers, options.max_chunk),
         peers_(peers) {}
 
-  // The mesh as a server would say it, and its geometry in the first part.
+  // The mesh as a server would say it, and its geometry where it is kept. Throws what on_progress
+  // threw, once all parts have stopped.
   Expected<Result> Go() {
     auto made = core::Mesher::CreatePart(request_.spec, peers_);
     if (!made) return Fail(ErrorCode::kRefused, made.error().message);
     core::Mesher& mesher = **made;
-    while (const auto batch = mesher.NextBatch()) Round(mesher, batch);
+    while (const auto batch = mesher.NextBatch()) {
+      if (IsToStop())
+        mesher.Cancel();
+      else
+        Round(mesher, batch);
+    }
+    if (thrown_) std::rethrow_exception(thrown_);
     server::SessionView view = ViewOf(mesher);
     view.report = mesher.report();
     view.state = StateOf(&view);
@@ -119,21 +128,30 @@ class PartRun {
     server::ToProto(request_, view, &result.mesh);
     if (view.state == server::SessionState::kFailed)
       return tl::unexpected(client::WhyFailed(result.mesh));
-    if (is_first_) result.history = HistoryOf(request_, mesher, std::move(walls_));
+    if (keeps_geometry_) result.history = HistoryOf(request_, mesher, std::move(walls_));
     return result;
   }
 
  private:
+  // Whether any part wants it to.
+  bool IsToStop() const {
+    return peers_.Sum(thrown_ || options_.stop.stop_requested() ? 1 : 0).all > 0;
+  }
+
   void Round(core::Mesher& mesher, const std::shared_ptr<const core::QueryBatch>& batch) {
     SharedQuestions::Outcome outcome = questions_.Ask(batch);
     if (outcome.failure) return Stop(mesher, std::move(*outcome.failure));
     const core::Expected<core::MeshDelta> delta = mesher.Absorb(outcome.answers);
     if (!delta) return Stop(mesher, server::ToMeshFailure(delta.error()));
     NoteWalls(*delta);
-    if (!is_first_ || !options_.on_progress) return;
+    if (!options_.on_progress) return;
     v1::Progress progress;
     server::ToProto(ViewOf(mesher), &progress);
-    options_.on_progress(client::FromProto(progress));
+    try {
+      options_.on_progress(client::FromProto(progress));
+    } catch (...) {
+      thrown_ = std::current_exception();  // others would wait for this part
+    }
   }
 
   void Stop(core::Mesher& mesher, server::MeshFailure failure) {
@@ -142,7 +160,7 @@ class PartRun {
   }
 
   void NoteWalls(const core::MeshDelta& delta) {
-    if (!is_first_ || delta.walls.empty()) return;
+    if (!keeps_geometry_ || delta.walls.empty()) return;
     walls_.resize(delta.first_vertex);
     walls_.insert(walls_.end(), delta.walls.begin(), delta.walls.end());
   }
@@ -172,13 +190,13 @@ class PartRun {
 
   const server::MeshRequest& request_;
   const MeshOptions& options_;
-  const bool is_first_;
+  const bool keeps_geometry_;
   const SharedQuestions questions_;
   const core::Peers& peers_;
   const Clock::time_point begun_ = Clock::now();
-  std::vector<core::WallSet>
-      walls_;  // of the vertices, in the first part; none where none is on any
+  std::vector<core::WallSet> walls_;  // of the vertices, where they are kept; none: none has any
   server::MeshFailure failure_;
+  std::exception_ptr thrown_;  // by on_progress
 };
 
 Expected<void> CheckPaths(const Oracle& oracle, const std::vector<std::string>& paths,
@@ -189,12 +207,23 @@ Expected<void> CheckPaths(const Oracle& oracle, const std::vector<std::string>& 
   return {};
 }
 
-}  // namespace
+// Before any call that waits for other ranks.
+Expected<void> CheckMpi() {
+  int is_initialized = 0, level = MPI_THREAD_SINGLE;
+  MPI_Initialized(&is_initialized);
+  if (is_initialized) MPI_Query_thread(&level);
+  if (level >= MPI_THREAD_SERIALIZED) return {};
+  return Fail(ErrorCode::kRefused,
+              "the mesher's threads call MPI one at a time: begin with MPI_Init_thread and "
+              "MPI_THREAD_SERIALIZED");
+}
 
-Expected<SavedMesh> MeshInParts(const Expected<std::unique_ptr<Oracle>>& made,
-                                const std::vector<std::string>& paths, const MeshOptions& options,
-                                MPI_Comm comm) {
-  const MpiPeers peers(comm);
+enum class Keep { kInAll, kInFirst };
+
+// A mesh from its declaration to its end, in all ranks.
+Expected<Result> Run(const Expected<std::shared_ptr<Oracle>>& made,
+                     const std::vector<std::string>& paths, const MeshOptions& options, Keep keep,
+                     const MpiPeers& peers, MPI_Comm comm) {
   const bool is_first = peers.part() == 0;
   const auto has_oracle = made ? Expected<void>() : tl::unexpected(made.error());
   if (auto agreed = Agree(peers, has_oracle); !agreed) return tl::unexpected(agreed.error());
@@ -204,14 +233,48 @@ Expected<SavedMesh> MeshInParts(const Expected<std::unique_ptr<Oracle>>& made,
   Expected<server::MeshRequest> request = Settle(oracle, options, peers);
   if (!request) return tl::unexpected(request.error());
   request->spec.threads = ThreadsOfEach(comm);
-  PartRun run(*request, oracle, options, peers);
-  Expected<Result> result = run.Go();
+  return PartRun(*request, oracle, options, peers, is_first || keep == Keep::kInAll).Go();
+}
+
+Expected<SavedMesh> RunTo(const Expected<std::shared_ptr<Oracle>>& made,
+                          const std::vector<std::string>& paths, const MeshOptions& options,
+                          MPI_Comm comm) {
+  const MpiPeers peers(comm);
+  Expected<Result> result = Run(made, paths, options, Keep::kInFirst, peers, comm);
   if (!result) return tl::unexpected(result.error());
-  Expected<SavedMesh> saved = is_first ? Save(std::move(*result), paths) : SavedMesh{};
+  const bool is_first = peers.part() == 0;
+  Expected<SavedMesh> saved = is_first ? Save(std::move(*result), paths) : Unsaved(*result);
   const Expected<void> own = saved ? Expected<void>() : tl::unexpected(saved.error());
   if (auto agreed = Agree(peers, own); !agreed) return tl::unexpected(agreed.error());
-  if (!is_first) saved->report = client::ReportOf(result->mesh);
   return saved;
 }
 
+}  // namespace
+
+Expected<SavedMesh> MeshInPartsTo(const Expected<std::unique_ptr<Oracle>>& made,
+                                  const std::vector<std::string>& paths, const MeshOptions& options,
+                                  MPI_Comm comm) {
+  if (!made) return RunTo(tl::unexpected(made.error()), paths, options, comm);
+  return RunTo(client::Scaled(**made, options), paths, options, comm);
+}
+
 }  // namespace stellate::mpi
+
+namespace stellate {
+
+Expected<Mesh> MeshInParts(Oracle& oracle, const MeshOptions& options, MPI_Comm comm) {
+  if (auto ok = mpi::CheckMpi(); !ok) return tl::unexpected(ok.error());
+  const mpi::MpiPeers peers(comm);
+  const auto scaled = client::Scaled(oracle, options);
+  Expected<mpi::Result> result = mpi::Run(scaled, {}, options, mpi::Keep::kInAll, peers, comm);
+  if (!result) return tl::unexpected(result.error());
+  return mpi::WholeOf(*result);
+}
+
+Expected<SavedMesh> MeshInPartsTo(Oracle& oracle, const std::vector<std::string>& paths,
+                                  const MeshOptions& options, MPI_Comm comm) {
+  if (auto ok = mpi::CheckMpi(); !ok) return tl::unexpected(ok.error());
+  return mpi::RunTo(client::Scaled(oracle, options), paths, options, comm);
+}
+
+}  // namespace stellate

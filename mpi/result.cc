@@ -43,24 +43,6 @@ Expected<bool> ForEachPart(const Result& result, const TakePart& take) {
   return true;
 }
 
-Expected<Mesh> WholeOf(const Result& result) {
-  const v1::MeshSpec& spec = result.mesh.spec();
-  auto builder =
-      client::DeltaMesh::Create(client::SimplexDimension(spec),
-                                static_cast<int>(spec.ambient_dimension()), spec.boundary_only());
-  if (!builder) return tl::unexpected(builder.error());
-  const Expected<bool> taken = ForEachPart(result, [&](auto&& part) -> Expected<bool> {
-    if (auto ok = builder->Add(std::move(part)); !ok) return tl::unexpected(ok.error());
-    return true;
-  });
-  if (!taken) return tl::unexpected(taken.error());
-  Expected<Mesh> mesh = builder->Take();
-  if (!mesh) return mesh;
-  mesh->region_names.assign(spec.region_names().begin(), spec.region_names().end());
-  mesh->report = client::ReportOf(result.mesh);
-  return mesh;
-}
-
 // Nothing: the mesh has to be written whole.
 Expected<std::optional<std::vector<Error>>> WriteAsItComes(const Result& result,
                                                            const std::vector<std::string>& paths) {
@@ -108,15 +90,37 @@ std::unique_ptr<server::MeshHistory> HistoryOf(const server::MeshRequest& reques
   return history;
 }
 
-Expected<SavedMesh> Save(Result result, const std::vector<std::string>& paths) {
+Expected<Mesh> WholeOf(const Result& result) {
   const v1::MeshSpec& spec = result.mesh.spec();
-  const server::MeshHistory::Snapshot size = result.history->At(result.history->revision());
-  SavedMesh saved{client::SimplexDimension(spec),
-                  static_cast<int>(spec.ambient_dimension()),
-                  size.vertices,
-                  size.simplices,
-                  client::ReportOf(result.mesh),
-                  {}};
+  auto builder =
+      client::DeltaMesh::Create(client::SimplexDimension(spec),
+                                static_cast<int>(spec.ambient_dimension()), spec.boundary_only());
+  if (!builder) return tl::unexpected(builder.error());
+  const Expected<bool> taken = ForEachPart(result, [&](auto&& part) -> Expected<bool> {
+    if (auto ok = builder->Add(std::move(part)); !ok) return tl::unexpected(ok.error());
+    return true;
+  });
+  if (!taken) return tl::unexpected(taken.error());
+  Expected<Mesh> mesh = builder->Take();
+  if (!mesh) return mesh;
+  mesh->region_names.assign(spec.region_names().begin(), spec.region_names().end());
+  mesh->report = client::ReportOf(result.mesh);
+  return mesh;
+}
+
+SavedMesh Unsaved(const Result& result) {
+  const v1::MeshSpec& spec = result.mesh.spec();
+  const Report report = client::ReportOf(result.mesh);
+  return {client::SimplexDimension(spec),
+          static_cast<int>(spec.ambient_dimension()),
+          report.counts.vertices,
+          report.counts.simplices,
+          report,
+          {}};
+}
+
+Expected<SavedMesh> Save(Result result, const std::vector<std::string>& paths) {
+  SavedMesh saved = Unsaved(result);
   if (paths.empty()) return saved;
   auto failures = WriteAsItComes(result, paths);
   if (!failures) return tl::unexpected(failures.error());

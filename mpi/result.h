@@ -24,6 +24,11 @@ std::unique_ptr<server::MeshHistory> HistoryOf(const server::MeshRequest& reques
                                                const core::Mesher& mesher,
                                                std::vector<core::WallSet> walls);
 
+// The mesh with its geometry, as DownloadMesh returns it.
+Expected<Mesh> WholeOf(const Result& result);
+
+// What is said of a mesh that is in no file.
+SavedMesh Unsaved(const Result& result);
 // Writes it to files, as DownloadMeshTo does.
 Expected<SavedMesh> Save(Result result, const std::vector<std::string>& paths);
 

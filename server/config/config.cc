@@ -71,20 +71,11 @@ Status Validate(const Config& config) {
   return CheckRanges(config);
 }
 
-bool IsDurable(const Config& config) {
-  return !config.data_dir.empty() || !config.database.empty();
-}
-
 Config WithDefaults(Config config) {
   if (config.max_memory_bytes == 0) config.max_memory_bytes = MachineBytes() / 4 * 3;
   if (config.owner_memory_bytes == 0) config.owner_memory_bytes = config.max_memory_bytes / 2;
   if (config.owner_meshes == 0) config.owner_meshes = config.max_meshes;
   return config;
-}
-
-double MaxWaitSeconds(const Config& config) {
-  if (config.max_wait_seconds > 0) return config.max_wait_seconds;
-  return IsDurable(config) ? 30 * 86400.0 : 3600;
 }
 
 std::size_t ChunkBytes(const Config& config) {

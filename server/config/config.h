@@ -78,14 +78,19 @@ struct Config {
 core::Status Validate(const Config& config);
 
 // Whether meshes outlive the server.
-bool IsDurable(const Config& config);
+inline bool IsDurable(const Config& config) {
+  return !config.data_dir.empty() || !config.database.empty();
+}
 
 // Replaces zeros that stand for a part of this machine, or of another limit, by numbers.
 Config WithDefaults(Config config);
 
 // The longest wait that a client may ask for: by default an hour, or 30 days where meshes are
 // recorded, since batch queues take their time.
-double MaxWaitSeconds(const Config& config);
+inline double MaxWaitSeconds(const Config& config) {
+  if (config.max_wait_seconds > 0) return config.max_wait_seconds;
+  return IsDurable(config) ? 30 * 86400.0 : 3600;
+}
 
 // Arrays travel in chunks of about this size.
 std::size_t ChunkBytes(const Config& config);

@@ -12,7 +12,8 @@ from jobs import ROOT, job, ranks, run
 IN_RANK_1 = """#!/bin/sh
 RANK=$PPID  # or that of a shell of its own
 grep -q stellate-mpi /proc/$RANK/comm || RANK=$(cut -d " " -f 4 /proc/$RANK/stat)
-export RANK
+SCRIPT=$$
+export RANK SCRIPT
 perl {root}/clients/pipe/torus.pl | if [ "$OMPI_COMM_WORLD_RANK" = 1 ]; then
   perl -e 'while (sysread STDIN, $said, 4096) {{
     syswrite STDOUT, $said;
@@ -63,7 +64,8 @@ def test_ranks_with_different_manifolds(tmp_path: Path) -> None:
 
 
 def test_an_oracle_that_ends_in_one_rank(tmp_path: Path) -> None:
-    command = oracle(tmp_path, 2000, "exit")
+    # With its script: torus.pl would go on reading, and the rank wait for it.
+    command = oracle(tmp_path, 2000, "kill KILL => $ENV{SCRIPT}; exit")
     done = job(3, "--oracle-command", command, "-e", ".1", "-o", tmp_path / "torus.vtu")
     assert done.returncode == 3, done.stderr
     assert "rank 1: " in done.stderr
