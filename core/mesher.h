@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/batch.h"
+#include "core/execution.h"
 #include "core/peers.h"
 #include "core/report.h"
 #include "core/specification.h"
@@ -22,17 +23,18 @@ namespace stellate::core {
 //   const Report& report = (*mesher)->report();
 //
 // Deterministic: the specification and the answers determine the mesh bit for bit, for any
-// Specification::threads. One thread at a time may use a Mesher, except that any thread may call
-// Interrupt; nothing here blocks, logs or reads a clock.
+// Execution. One thread at a time may use a Mesher, except that any thread may call Interrupt;
+// nothing here blocks, logs or reads a clock.
 class Mesher {
  public:
-  // Returns a mesher before its first round. Errors: those of Validate(spec).
-  static Expected<std::unique_ptr<Mesher>> Create(Specification spec);
+  // Returns a mesher before its first round. Errors: those of Validate, of either.
+  static Expected<std::unique_ptr<Mesher>> Create(Specification spec, Execution execution = {});
   // One of those of many parts, which make the mesh of one together, bit for bit. Each is given the
   // same answers, asks and says the same, and holds the mesh; they share what there is to compute.
   // `peers` is borrowed. CreatePart and Absorb wait for the other parts: all make the same
   // calls, and none is interrupted while it is in one.
-  static Expected<std::unique_ptr<Mesher>> CreatePart(Specification spec, const Peers& peers);
+  static Expected<std::unique_ptr<Mesher>> CreatePart(Specification spec, const Peers& peers,
+                                                      Execution execution = {});
   virtual ~Mesher() = default;
 
   // Returns the queries of the next round, or nullptr once the run is over: the same batch until

@@ -90,8 +90,6 @@ Status Validate(const ReconstructionSpecification& spec) {
     return Invalid("reach",
                    "reach is set together with closed = false, but only manifolds without boundary "
                    "can be proved: leave one of them out");
-  if (spec.threads < 0)
-    return Invalid("threads", Message("threads is ", spec.threads, " but must be 0 or more"));
   return Status::Ok();
 }
 
@@ -138,13 +136,15 @@ void ReconstructionWatch::Advance(ReconstructionPhase phase, double fraction) {
 }
 
 Expected<Reconstruction> Reconstruct(const ReconstructionSpecification& spec,
-                                     const PointCloud& cloud, ReconstructionWatch* watch) {
+                                     const PointCloud& cloud, Execution execution,
+                                     ReconstructionWatch* watch) {
   if (Status status = Validate(spec); !status.ok()) return tl::unexpected(status);
   if (Status status = Validate(spec, cloud); !status.ok()) return tl::unexpected(status);
+  if (Status status = Validate(execution); !status.ok()) return tl::unexpected(status);
   ReconstructionWatch own;
   if (!watch) watch = &own;
   Expected<Reconstruction> result;
-  const bool finished = WithThreads(spec.threads, watch->interruption(),
+  const bool finished = WithThreads(execution.threads, watch->interruption(),
                                     [&] { result = ReconstructCloud(spec, cloud, watch); });
   if (!finished) return Refuse(StatusCode::kCancelled, "the reconstruction was cancelled");
   return result;

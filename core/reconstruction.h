@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "core/base/interruption.h"
+#include "core/execution.h"
 #include "core/places.h"
 #include "core/report.h"
 #include "core/status.h"
@@ -26,7 +27,7 @@ enum class Weighting {
 };
 
 // How to reconstruct a k-manifold M of R^d from points on it or near it (Chapter 3). Together with
-// the points, in their order, it determines the result; the number of threads does not.
+// the points, in their order, it determines the result.
 //
 //   ReconstructionSpecification spec;
 //   spec.dimension = 2, spec.ambient_dimension = 3;
@@ -48,7 +49,6 @@ struct ReconstructionSpecification {
   // The caller promises that M's reach is at least this, a length. If the points have no noise, the
   // mesh may then be proved (docs/using/proof.md).
   std::optional<double> reach;
-  int threads = 0;  // 0: all cores
 };
 
 // Returns how many points may be added to so many.
@@ -130,14 +130,15 @@ class ReconstructionWatch {
   std::atomic<double> fraction_ = 0;
 };
 
-// Reconstructs M. Errors: those of both Validate, and kCancelled. A result that is not certified is
-// no error: its report says why, and its places say where.
+// Reconstructs M. Errors: those of Validate, of each argument, and kCancelled. A result that is not
+// certified is no error: its report says why, and its places say where.
 //
 //   const auto result = Reconstruct(spec, {points, {}});
 //   if (result && result->report.certificate.certified) Use(result->simplices);
 //
-// Pure: the same points in the same order give the same bits, for any number of threads.
+// Pure: the same points in the same order give the same bits, for any Execution.
 Expected<Reconstruction> Reconstruct(const ReconstructionSpecification& spec,
-                                     const PointCloud& cloud, ReconstructionWatch* watch = nullptr);
+                                     const PointCloud& cloud, Execution execution = {},
+                                     ReconstructionWatch* watch = nullptr);
 
 }  // namespace stellate::core

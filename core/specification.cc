@@ -348,10 +348,6 @@ Status CheckLimits(const Specification& spec) {
         "limits.max_rounds",
         "limits.max_rounds is 0 but must be at least 1: a round is one batch of queries");
   }
-  if (spec.threads < 0) {
-    return Invalid("threads", Message("threads is ", spec.threads,
-                                      " but must not be negative: 0 takes all cores"));
-  }
   return Status::Ok();
 }
 

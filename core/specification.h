@@ -100,14 +100,16 @@ enum class Audit {
   kThorough,  // about every vertex and every simplex
 };
 
+// Where a run ends that does not end by itself: the mesh is then kept as it is, uncertified.
 struct Limits {
   std::uint64_t max_vertices = 10'000'000;
   std::uint64_t max_rounds = 100'000;   // batches of queries
-  std::uint64_t max_batch_queries = 0;  // a larger round is asked in several batches, for the same
-                                        // mesh; 0: no limit
+  std::uint64_t max_batch_queries = 0;  // a larger round is asked in several batches, and each
+                                        // counts as one of max_rounds. The same mesh, unless it
+                                        // ends by them. 0: no limit
 };
 
-// All that determines a mesh besides the answers; and the number of threads, which does not.
+// All that determines a mesh besides the answers. How it is computed is in core/execution.h.
 //
 //   Specification spec;
 //   spec.dimension = 2, spec.ambient_dimension = 3, spec.epsilon = 0.1;
@@ -144,7 +146,6 @@ struct Specification {
   Criteria criteria;
   Audit audit = Audit::kStandard;
   Limits limits;
-  int threads = 0;  // 0: all cores
 
   int simplex_dimension() const { return dimension - (boundary_only ? 1 : 0); }
   // How many labels each simplex has: none, that of its region, or those of both its sides.

@@ -101,9 +101,10 @@ class PartRun {
  public:
   // keeps_geometry: whether this part is to have the mesh's geometry in the end.
   PartRun(const server::MeshRequest& request, Oracle& oracle, const MeshOptions& options,
-          const core::Peers& peers, bool keeps_geometry)
+          const core::Peers& peers, core::Execution execution, bool keeps_geometry)
       : request_(request),
         options_(options),
+        execution_(execution),
         keeps_geometry_(keeps_geometry),
         questions_(request.spec, oracle, peers, options.workers, options.max_chunk),
         peers_(peers) {}
@@ -111,7 +112,7 @@ class PartRun {
   // The mesh as a server would say it, and its geometry where it is kept. Throws what on_progress
   // threw, once all parts have stopped.
   Expected<Result> Go() {
-    auto made = core::Mesher::CreatePart(request_.spec, peers_);
+    auto made = core::Mesher::CreatePart(request_.spec, peers_, execution_);
     if (!made) return Fail(ErrorCode::kRefused, made.error().message);
     core::Mesher& mesher = **made;
     while (const auto batch = mesher.NextBatch()) {
@@ -128,7 +129,7 @@ class PartRun {
     server::ToProto(request_, view, &result.mesh);
     if (view.state == server::SessionState::kFailed)
       return tl::unexpected(client::WhyFailed(result.mesh));
-    if (keeps_geometry_) result.history = HistoryOf(request_, mesher, std::move(walls_));
+    if (keeps_geometry_) result.history = HistoryOf(mesher, execution_, std::move(walls_));
     return result;
   }
 
@@ -190,6 +191,7 @@ class PartRun {
 
   const server::MeshRequest& request_;
   const MeshOptions& options_;
+  const core::Execution execution_;
   const bool keeps_geometry_;
   const SharedQuestions questions_;
   const core::Peers& peers_;
@@ -232,8 +234,9 @@ Expected<Result> Run(const Expected<std::shared_ptr<Oracle>>& made,
   if (auto agreed = Agree(peers, writable); !agreed) return tl::unexpected(agreed.error());
   Expected<server::MeshRequest> request = Settle(oracle, options, peers);
   if (!request) return tl::unexpected(request.error());
-  request->spec.threads = ThreadsOfEach(comm);
-  return PartRun(*request, oracle, options, peers, is_first || keep == Keep::kInAll).Go();
+  return PartRun(*request, oracle, options, peers, {.threads = ThreadsOfEach(comm)},
+                 is_first || keep == Keep::kInAll)
+      .Go();
 }
 
 Expected<SavedMesh> RunTo(const Expected<std::shared_ptr<Oracle>>& made,

@@ -69,10 +69,10 @@ Expected<std::optional<std::vector<Error>>> WriteAsItComes(const Result& result,
 
 }  // namespace
 
-std::unique_ptr<server::MeshHistory> HistoryOf(const server::MeshRequest& request,
-                                               const core::Mesher& mesher,
+std::unique_ptr<server::MeshHistory> HistoryOf(const core::Mesher& mesher,
+                                               core::Execution execution,
                                                std::vector<core::WallSet> walls) {
-  const core::Specification& spec = request.spec;
+  const core::Specification& spec = mesher.specification();
   core::MeshDelta whole;
   whole.revision = 1;
   whole.points = mesher.Points();
@@ -86,7 +86,7 @@ std::unique_ptr<server::MeshHistory> HistoryOf(const server::MeshRequest& reques
     throw std::logic_error(status.message);
   whole = {};
   core::Interruption never;
-  core::WithThreads(spec.threads, never, [&] { history->Orient(); });
+  core::WithThreads(execution.threads, never, [&] { history->Orient(); });
   return history;
 }
 

@@ -20,8 +20,8 @@ struct Result {
 
 // The geometry of a mesh that is over, in one revision, oriented. `walls`: of each vertex up to the
 // last that is on any.
-std::unique_ptr<server::MeshHistory> HistoryOf(const server::MeshRequest& request,
-                                               const core::Mesher& mesher,
+std::unique_ptr<server::MeshHistory> HistoryOf(const core::Mesher& mesher,
+                                               core::Execution execution,
                                                std::vector<core::WallSet> walls);
 
 // The mesh with its geometry, as DownloadMesh returns it.

@@ -30,8 +30,11 @@ Status CheckInParts(const Specification& spec, const QueryBlock& block, const An
 }  // namespace
 
 template <int K>
-MeshingRun<K>::MeshingRun(Specification spec, const Peers& peers)
-    : spec_(std::move(spec)), scheduler_(spec_, interruption_, peers), mesh_(scheduler_.engine()) {
+MeshingRun<K>::MeshingRun(Specification spec, const Peers& peers, Execution execution)
+    : spec_(std::move(spec)),
+      execution_(execution),
+      scheduler_(spec_, interruption_, peers),
+      mesh_(scheduler_.engine()) {
   OpenRound();
 }
 
@@ -91,7 +94,7 @@ Expected<MeshDelta> MeshingRun<K>::Absorb(const Answers& answers) {
   const std::shared_ptr<const QueryBatch> batch = OpenBatch();
   const QueryBatch& asked = *batch;
   Status status = {StatusCode::kCancelled, "the computation was interrupted"};
-  WithThreads(spec_.threads, interruption_, [&] { status = Check(asked, answers); });
+  WithThreads(execution_.threads, interruption_, [&] { status = Check(asked, answers); });
   if (!status.ok()) return tl::unexpected<Status>(status);
   const bool complete = !parts_ || parts_->is_last();
   const std::optional<Answers> joined =
@@ -121,7 +124,7 @@ Expected<MeshDelta> MeshingRun<K>::Absorb(const Answers& answers) {
     if (complete) mesh_.Update(&delta);
     Update();
   };
-  if (!WithThreads(spec_.threads, interruption_, advance)) {
+  if (!WithThreads(execution_.threads, interruption_, advance)) {
     // The run may just have ended, but no caller has seen that.
     scheduler_.Reopen();
     progress_ = progress_before;

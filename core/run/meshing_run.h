@@ -21,7 +21,7 @@ template <int K>
 class MeshingRun final : public Mesher {
  public:
   // `peers` is borrowed.
-  MeshingRun(Specification spec, const Peers& peers);
+  MeshingRun(Specification spec, const Peers& peers, Execution execution);
 
   std::shared_ptr<const QueryBatch> NextBatch() override;
   Expected<MeshDelta> Absorb(const Answers& answers) override;
@@ -48,6 +48,7 @@ class MeshingRun final : public Mesher {
   void Update();
 
   const Specification spec_;
+  const Execution execution_;
   Interruption interruption_;
   Scheduler<K> scheduler_;
   OutputMesh<K> mesh_;

@@ -20,9 +20,9 @@ constexpr double kUploadShare = 0.2;
 
 }  // namespace
 
-PointRounds::PointRounds(const PointsRequest& request, core::ReconstructionWatch* watch,
-                         PointPlaces* places)
-    : request_(request), watch_(watch), places_(places) {
+PointRounds::PointRounds(const PointsRequest& request, core::Execution execution,
+                         core::ReconstructionWatch* watch, PointPlaces* places)
+    : request_(request), execution_(execution), watch_(watch), places_(places) {
   specification_.dimension = request_.spec.dimension;
   specification_.ambient_dimension = request_.spec.ambient_dimension;
   const auto n = static_cast<Index>(request_.points);
@@ -81,7 +81,7 @@ Status PointRounds::Take(const core::AnswerBlock& rows, core::MeshDelta* delta) 
 }
 
 Status PointRounds::Reconstruct(core::MeshDelta* delta) {
-  auto made = core::Reconstruct(request_.spec, cloud_, watch_);
+  auto made = core::Reconstruct(request_.spec, cloud_, execution_, watch_);
   if (!made) return std::move(made.error());
   cloud_ = {};
   delta->points = std::move(made->added);

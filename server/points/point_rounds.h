@@ -23,7 +23,8 @@ class PointRounds final : public core::Mesher {
  public:
   // `watch` and `places` outlive it; any thread may read the progress of `watch`. The last Absorb
   // fills `places`.
-  PointRounds(const PointsRequest& request, core::ReconstructionWatch* watch, PointPlaces* places);
+  PointRounds(const PointsRequest& request, core::Execution execution,
+              core::ReconstructionWatch* watch, PointPlaces* places);
 
   std::shared_ptr<const core::QueryBatch> NextBatch() override;
   core::Expected<core::MeshDelta> Absorb(const core::Answers& answers) override;
@@ -50,6 +51,7 @@ class PointRounds final : public core::Mesher {
   void End(core::Termination termination);
 
   const PointsRequest request_;
+  const core::Execution execution_;
   core::Specification specification_;  // its dimensions
   core::ReconstructionWatch* const watch_;
   PointPlaces* const places_;

@@ -50,7 +50,6 @@ void LayOutSpecification(Archive& archive, Value& spec) {
   archive.Number(spec.limits.max_vertices);
   archive.Number(spec.limits.max_rounds);
   archive.Number(spec.limits.max_batch_queries);
-  archive.Number(spec.threads);
   archive.Number(spec.walls);
   archive.Bytes(spec.labels);
   archive.Ids(spec.closures);
@@ -71,7 +70,6 @@ void LayOutPoints(Archive& archive, Value& points) {
   archive.Maybe(spec.noise);
   archive.Number(spec.drop);
   archive.Maybe(spec.reach);
-  archive.Number(spec.threads);
   archive.Number(spec.weights);
   archive.Number(spec.steiner);
 }

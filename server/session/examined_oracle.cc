@@ -92,7 +92,7 @@ ExaminedOracle::ExaminedOracle(core::Specification spec, std::optional<double> e
 }
 
 MesherFactory ExaminedOracle::Examiner() {
-  return [self = shared_from_this()](core::Specification spec) {
+  return [self = shared_from_this()](core::Specification spec, core::Execution) {
     return core::Expected<std::unique_ptr<core::Mesher>>(
         std::make_unique<Mesher>(self, std::move(spec)));
   };

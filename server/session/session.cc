@@ -58,11 +58,13 @@ std::unique_ptr<PointIntake> IntakeOf(const MeshRequest& request) {
   return std::make_unique<PointIntake>(*request.points, request.timeouts.worker_wait);
 }
 
-core::Expected<std::unique_ptr<core::Mesher>> Begin(const MeshRequest& request,
+core::Expected<std::unique_ptr<core::Mesher>> Begin(const SessionOptions& options,
                                                     const Session::MesherFactory& factory,
                                                     PointIntake* intake) {
-  if (intake == nullptr) return factory(request.spec);
-  return std::make_unique<PointRounds>(*request.points, &intake->watch(), &intake->places());
+  const core::Execution execution = options.policy.execution;
+  if (intake == nullptr) return factory(options.request.spec, execution);
+  return std::make_unique<PointRounds>(*options.request.points, execution, &intake->watch(),
+                                       &intake->places());
 }
 
 const char* KindOf(const SessionOptions& options) {
@@ -131,7 +133,7 @@ void Session::Run() {
   std::unique_ptr<core::Mesher> mesher;
   std::optional<core::Report> report;
   try {
-    auto made = Begin(request(), factory_, intake_.get());
+    auto made = Begin(options_, factory_, intake_.get());
     if (made) {
       mesher = std::move(*made);
       if (ports().turns) mesher = InTurns(std::move(mesher), ports().turns, request().owner);
@@ -369,7 +371,7 @@ std::optional<MeshFailure> Session::PublishRound(core::Mesher* mesher) {
 void Session::Orient() {
   if (history_.revision() == 0 || life() == Life::kSuspended) return;
   try {
-    core::WithThreads(request().spec.threads, orienting_, [this] { history_.Orient(); });
+    core::WithThreads(policy().execution.threads, orienting_, [this] { history_.Orient(); });
   } catch (const std::bad_alloc&) {
     Log(LogLevel::kWarning, log_context(), "no memory to orient the mesh: it ends without");
   }

@@ -26,12 +26,13 @@ class SessionObserver : public PoolObserver {
 };
 
 // Makes what a session runs.
-using MesherFactory =
-    std::function<core::Expected<std::unique_ptr<core::Mesher>>(core::Specification)>;
+using MesherFactory = std::function<core::Expected<std::unique_ptr<core::Mesher>>(
+    core::Specification, core::Execution)>;
 
 // What the server decides about a mesh, for every owner.
 struct MeshPolicy {
   DispatchPolicy dispatch;
+  core::Execution execution;
   std::size_t max_workers = 64;
   std::size_t max_watchers = 64;
 };

@@ -60,8 +60,7 @@ Taken Mesh(const std::string& name, double epsilon) {
   const auto manifold = stellate::testing::Make(name);
   stellate::core::Specification spec = stellate::testing::SpecificationFor(*manifold, epsilon);
   spec.seeds.resize(0, 0);
-  spec.threads = 1;
-  auto mesher = stellate::core::Mesher::Create(spec);
+  auto mesher = stellate::core::Mesher::Create(spec, {.threads = 1});
   if (!mesher) {
     std::fprintf(stderr, "%s\n", mesher.error().message.c_str());
     std::exit(2);

@@ -56,16 +56,15 @@ std::uint64_t Fingerprint(const core::Mesher& mesher) {
   return sum;
 }
 
-core::Specification OneThread(const Manifold& manifold, double epsilon) {
+core::Specification SpecificationOf(const Manifold& manifold, double epsilon) {
   core::Specification spec = testing::SpecificationFor(manifold, epsilon);
-  spec.threads = 1;
   spec.limits.max_vertices = 100'000'000;
   return spec;
 }
 
 Meshed Mesh(Manifold& manifold, const core::Specification& spec, const Field& sizes = {},
-            double (*seconds)() = ProcessorSeconds) {
-  auto created = core::Mesher::Create(spec);
+            double (*seconds)() = ProcessorSeconds, int threads = 1) {
+  auto created = core::Mesher::Create(spec, {.threads = threads});
   if (!created) throw std::runtime_error(created.error().message);
   core::Mesher& mesher = **created;
   Meshed meshed;
@@ -129,7 +128,7 @@ void RegisterRounds(const Work& work) {
   for (const bool speculative : {false, true}) {
     Register(NameOf("rounds", work) + (speculative ? "/speculative" : "/plain"),
              [=, seed = std::uint64_t{0}](State& state) mutable {
-               core::Specification spec = OneThread(*manifold, work.epsilon);
+               core::Specification spec = SpecificationOf(*manifold, work.epsilon);
                spec.seeds.resize(0, 0);
                spec.criteria.speculative = speculative;
                spec.random_seed = ++seed;
@@ -187,7 +186,7 @@ const Graded kGraded[] = {
 void RegisterGraded(const Graded& c) {
   const auto manifold = Make(c.manifold);
   Register(std::string("graded/") + c.name, [=, seed = std::uint64_t{0}](State& state) mutable {
-    core::Specification spec = OneThread(*manifold, c.epsilon);
+    core::Specification spec = SpecificationOf(*manifold, c.epsilon);
     spec.seeds.resize(0, 0);
     if (c.rate > 0) spec.criteria.size_rate = c.rate;
     if (c.deviation > 0) spec.criteria.max_deviation = c.deviation;
@@ -205,7 +204,7 @@ void RegisterGraded(const Graded& c) {
 void RegisterCertificate(const Work& work) {
   const auto manifold = Make(work.manifold);
   Register(NameOf("certificate", work), [=](State& state) {
-    core::Specification spec = OneThread(*manifold, work.epsilon);
+    core::Specification spec = SpecificationOf(*manifold, work.epsilon);
     spec.random_seed = 1;
     for ([[maybe_unused]] auto _ : state) {
       const Meshed meshed = Mesh(*manifold, spec);
@@ -223,7 +222,7 @@ void RegisterDimension() {
   auto* const benchmark = Register("dimension/torus:1:0.4", [](State& state) {
     const auto manifold = Make("torus:1:0.4@" + std::to_string(state.range(0)));
     for ([[maybe_unused]] auto _ : state) {
-      const Meshed meshed = Mesh(*manifold, OneThread(*manifold, 0.02));
+      const Meshed meshed = Mesh(*manifold, SpecificationOf(*manifold, 0.02));
       state.SetIterationTime(meshed.seconds());
       Tell(meshed, state);
     }
@@ -241,12 +240,11 @@ void RegisterThreads(const Work& work) {
   const int cores = std::max(2, static_cast<int>(std::thread::hardware_concurrency()));
   for (int threads = 1; threads <= cores; threads *= 2) {
     Register(NameOf("threads", work) + '/' + std::to_string(threads), [=](State& state) {
-      core::Specification spec = OneThread(*manifold, work.epsilon);
-      spec.threads = threads;
+      const core::Specification spec = SpecificationOf(*manifold, work.epsilon);
       for ([[maybe_unused]] auto _ : state) {
-        Meshed best = Mesh(*manifold, spec, {}, ClockSeconds);
+        Meshed best = Mesh(*manifold, spec, {}, ClockSeconds, threads);
         for (int run = 1; run < 3; ++run)
-          if (const Meshed next = Mesh(*manifold, spec, {}, ClockSeconds);
+          if (const Meshed next = Mesh(*manifold, spec, {}, ClockSeconds, threads);
               next.seconds() < best.seconds())
             best = next;
         state.SetIterationTime(best.seconds());

@@ -47,8 +47,7 @@ int main(int argc, char** argv) {
   counts_all = std::strcmp(argv[1], "serial") != 0;
   const auto manifold = stellate::testing::Make(argv[2]);
   auto spec = stellate::testing::SpecificationFor(*manifold, std::atof(argv[3]));
-  spec.threads = 1;
-  const auto mesher = stellate::core::Mesher::Create(spec);
+  const auto mesher = stellate::core::Mesher::Create(spec, {.threads = 1});
   if (!mesher) {
     std::fprintf(stderr, "serial: %s\n", mesher.error().message.c_str());
     return 2;

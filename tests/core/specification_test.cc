@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "core/base/infinity.h"
+#include "core/execution.h"
 #include "core/report.h"
 #include "tests/core/support/nan.h"
 
@@ -34,6 +35,14 @@ struct BadCase {
   std::function<void(Specification&)> spoil;
   StatusCode code = StatusCode::kInvalidArgument;
 };
+
+TEST(Validate, RefusesNegativeThreads) {
+  EXPECT_TRUE(Validate(Execution{}).ok());
+  const Status status = Validate(Execution{.threads = -2});
+  EXPECT_EQ(status.code, StatusCode::kInvalidArgument);
+  EXPECT_EQ(status.field, "threads");
+  EXPECT_NE(status.message.find("threads is -2 "), std::string::npos) << status.message;
+}
 
 TEST(Validate, AcceptsWhatIsMeant) {
   EXPECT_EQ(Validate(Good()).message, "");
@@ -118,7 +127,6 @@ TEST(Validate, NamesTheFieldAndTheValueOfWhatItRefuses) {
       {"limits.max_vertices is 4294967296 ",
        [](auto& s) { s.limits.max_vertices = std::uint64_t{1} << 32; }, StatusCode::kLimitExceeded},
       {"limits.max_rounds is 0 ", [](auto& s) { s.limits.max_rounds = 0; }},
-      {"threads is -2 ", [](auto& s) { s.threads = -2; }},
       {"labels are set without walls",
        [](auto& s) {
          s.labels = {0, 1};

@@ -125,7 +125,6 @@ void Damage(Script* script, Files* files) {
 // Every mesh that is read back goes on to the mesh that it was to become.
 void GoOn(server::Journal* journal, const std::string& geometry) {
   for (server::SessionOptions& options : journal->TakeMeshes()) {
-    options.request.spec.threads = 1;
     options.request.timeouts = SmallSphere().request.timeouts;
     options.policy = SmallSphere().policy;
     server::Session session(options);

@@ -48,9 +48,8 @@ void CheckFirstQuestions(core::Specification spec) {
   const auto d = static_cast<std::uint64_t>(spec.ambient_dimension);
   const auto seeds = static_cast<std::uint64_t>(spec.seeds.cols() + spec.box_seeds);
   if (d * seeds > kMostSeedCoordinates) return;
-  spec.threads = 1;
   const Eigen::Index rows = spec.ambient_dimension;
-  const auto mesher = core::Mesher::Create(std::move(spec));
+  const auto mesher = core::Mesher::Create(std::move(spec), {.threads = 1});
   Require(mesher.has_value(), "a valid specification makes a mesher");
   const auto batch = (*mesher)->NextBatch();
   Require(batch != nullptr && batch->size() > 0, "a mesher begins with a question");

@@ -273,12 +273,12 @@ server::SessionOptions SmallSphere() {
   options.request.name = "meshes/00000000000000000000000000000000";
   options.request.spec = server::testing::SphereSpec(0.8);
   options.request.spec.box_seeds = 8;
-  options.request.spec.threads = 1;
   options.request.spec.limits.max_vertices = 400;
   options.request.spec.limits.max_rounds = 60;
   options.request.timeouts.answer_limit = 2ms;
   options.request.timeouts.worker_wait = 2ms;
   options.policy.dispatch.chunk_bytes = 1 << 10;
+  options.policy.execution.threads = 1;
   return options;
 }
 

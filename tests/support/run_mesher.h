@@ -71,10 +71,11 @@ inline core::Answers AnswersOf(Oracle& oracle, const core::QueryBatch& batch) {
 
 // Meshes `oracle` in this process. Throws std::runtime_error with the mesher's own words when it
 // refuses the specification or an answer.
-inline FinishedRun RunMesher(Oracle& oracle, core::Specification spec) {
+inline FinishedRun RunMesher(Oracle& oracle, core::Specification spec,
+                             core::Execution execution = {}) {
   FinishedRun run;
   run.spec = spec;
-  auto mesher = core::Mesher::Create(std::move(spec));
+  auto mesher = core::Mesher::Create(std::move(spec), execution);
   if (!mesher) throw std::runtime_error(mesher.error().message);
   const double start = ProcessorSeconds();
   while (const auto batch = (*mesher)->NextBatch()) {

@@ -36,7 +36,7 @@ bool SawAll(const Case& c, bool thorough) {
   oracle.NoteComponents();
   core::Specification spec = SpecificationOf(c, oracle);
   spec.audit = thorough ? core::Audit::kThorough : core::Audit::kStandard;
-  testing::RunMesher(oracle, spec);
+  testing::RunMesher(oracle, spec, {.threads = 1});
   return static_cast<int>(oracle.components().size()) == c.shape->parts();
 }
 
@@ -45,7 +45,6 @@ bool SawAll(const Case& c, bool thorough) {
 core::Specification SpecificationOf(const Case& c, const ShapeOracle& oracle) {
   core::Specification spec = testing::SpecificationFor(oracle, c.epsilon);
   spec.limits.max_vertices = kMostVertices[c.shape->k()];
-  spec.threads = 1;
   return spec;
 }
 
@@ -56,7 +55,7 @@ Run Judge(const Case& c, bool thorough, double declared) {
   spec.audit = thorough ? core::Audit::kThorough : core::Audit::kStandard;
   if (declared > 0 && ReachOf(c) > 0) spec.declared_reach = declared * ReachOf(c);
   try {
-    const testing::FinishedRun run = testing::RunMesher(oracle, spec);
+    const testing::FinishedRun run = testing::RunMesher(oracle, spec, {.threads = 1});
     const core::Certificate& certificate = run.report.certificate;
     result.told = certificate.verdict;
     result.counts = run.report.counts;

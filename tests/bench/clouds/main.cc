@@ -29,10 +29,9 @@ Reconstructed ReconstructWithStellate(const testing::Sample& sample) {
   core::ReconstructionSpecification spec;
   spec.dimension = sample.k;
   spec.ambient_dimension = sample.d;
-  spec.threads = 1;
   Reconstructed made;
   const double before = ProcessorSeconds();
-  auto result = core::Reconstruct(spec, {sample.points, {}});
+  auto result = core::Reconstruct(spec, {sample.points, {}}, {.threads = 1});
   made.seconds = ProcessorSeconds() - before;
   made.vertices = static_cast<std::uint32_t>(sample.points.cols());
   if (!result) return made;

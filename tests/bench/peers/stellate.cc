@@ -19,12 +19,11 @@ Outcome MeshWithStellate(const Task& task, Meter& meter) {
         oracle, std::vector{oracles::HalfSpace(PoleOf(*manifold), *task.clip)});
   }
   core::Specification spec = stellate::testing::SpecificationFor(*oracle, task.size);
-  spec.threads = 1;
   if (task.radius_edge_bound > 0) spec.criteria.radius_edge_bound = task.radius_edge_bound;
 
   Outcome outcome;
   meter.Start();
-  auto mesher = core::Mesher::Create(spec);
+  auto mesher = core::Mesher::Create(spec, {.threads = 1});
   if (!mesher) throw std::runtime_error(mesher.error().message);
   double refined = ProcessorSeconds();  // when the last round that inserted points was over
   while (const auto batch = (*mesher)->NextBatch()) {

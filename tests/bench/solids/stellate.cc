@@ -70,14 +70,13 @@ std::vector<Curve> CurvesOf(testing::Domain& domain, const SolidMesh& mesh,
 SolidMesh MeshWithStellate(const Solid& solid, double epsilon, std::vector<Curve>* edges) {
   testing::Domain domain = solid.domain;
   core::Specification spec = domain.SpecificationFor(epsilon);
-  spec.threads = 1;
   if (solid.label)
     for (core::WallSet signs = 0; signs < core::SetOfWall(spec.walls); ++signs)
       spec.labels.push_back(static_cast<std::int8_t>(solid.label(signs)));
   SolidMesh mesh;
   std::vector<core::WallSet> walls;
   const double began = ProcessorSeconds();
-  auto mesher = core::Mesher::Create(std::move(spec));
+  auto mesher = core::Mesher::Create(std::move(spec), {.threads = 1});
   if (!mesher) throw std::runtime_error(mesher.error().message);
   while (const auto batch = (*mesher)->NextBatch()) {
     const double asked = ProcessorSeconds();

@@ -196,8 +196,7 @@ Subject SubjectOf(const GoldenCase& c) {
 std::string Record(const GoldenCase& c, int threads, const Peers& peers = NoPeers()) {
   auto [spec, answer] = SubjectOf(c);
   c.change(spec);
-  spec.threads = threads;
-  const auto mesher = std::move(*Mesher::CreatePart(spec, peers));
+  const auto mesher = std::move(*Mesher::CreatePart(spec, peers, {.threads = threads}));
   std::ostringstream out;
   out << kLegend << (spec.walls > 0 ? kLegendOfWalls : "");
   std::string phase;

@@ -188,8 +188,7 @@ TEST(AddedPoints, MakeStarsAgreeWhereNothingElseDoes) {
           result->report.certificate.warnings.begin(), result->report.certificate.warnings.end(),
           [](const std::string& w) { return w.find("none of the points") != std::string::npos; }),
       result->report.certificate.warnings.end());
-  spec.threads = 3;
-  EXPECT_EQ(Reconstruct(spec, {sample.points, {}})->simplices, result->simplices);
+  EXPECT_EQ(Reconstruct(spec, {sample.points, {}}, {.threads = 3})->simplices, result->simplices);
 }
 
 TEST(AddedPoints, AreNoneWhereStarsAgree) {

@@ -27,10 +27,8 @@ TEST(Run, IsTheSameForAnyNumberOfThreads) {
     const Sample sample = Draw(c.sample);
     ReconstructionSpecification spec = SpecOf(sample.k, sample.d);
     spec.weights = c.weights;
-    spec.threads = 1;
-    const auto one = Reconstruct(spec, {sample.points, {}});
-    spec.threads = 8;
-    const auto eight = Reconstruct(spec, {sample.points, {}});
+    const auto one = Reconstruct(spec, {sample.points, {}}, {.threads = 1});
+    const auto eight = Reconstruct(spec, {sample.points, {}}, {.threads = 8});
     ASSERT_TRUE(one && eight);
     EXPECT_EQ(one->simplices, eight->simplices);
     EXPECT_EQ(one->places, eight->places);
@@ -49,7 +47,7 @@ TEST(Run, IsInterrupted) {
     while (watch.progress().phase == ReconstructionPhase::kIndexing) std::this_thread::yield();
     watch.Interrupt();
   });
-  const auto result = Reconstruct(SpecOf(2, 3), {sample.points, {}}, &watch);
+  const auto result = Reconstruct(SpecOf(2, 3), {sample.points, {}}, {}, &watch);
   other.join();
   ASSERT_FALSE(result);
   EXPECT_EQ(result.error().code, StatusCode::kCancelled);
@@ -59,7 +57,7 @@ TEST(Run, ReportsItsProgress) {
   const Sample sample = Draw(Of("s2", 400, true));
   ReconstructionWatch watch;
   EXPECT_EQ(watch.progress().fraction, 0);
-  ASSERT_TRUE(Reconstruct(SpecOf(2, 3), {sample.points, {}}, &watch));
+  ASSERT_TRUE(Reconstruct(SpecOf(2, 3), {sample.points, {}}, {}, &watch));
   EXPECT_EQ(watch.progress().phase, ReconstructionPhase::kDone);
   EXPECT_EQ(watch.progress().fraction, 1);
 }

@@ -39,13 +39,12 @@ class Determinism : public ::testing::TestWithParam<RepeatedCase> {
 };
 
 TEST_P(Determinism, TheNumberOfThreadsDoesNotMatter) {
-  spec_.threads = 1;
-  const DrivenRun one = Drive(spec_, *manifold_), again = Drive(spec_, *manifold_);
+  const Execution alone{.threads = 1};
+  const DrivenRun one = Drive(spec_, *manifold_, alone), again = Drive(spec_, *manifold_, alone);
   ASSERT_EQ(one.report().termination, Termination::kConverged);
   EXPECT_TRUE(SameMesh(*one.mesher, *again.mesher));
   for (const int threads : {2, 4, 0}) {
-    spec_.threads = threads;
-    const DrivenRun many = Drive(spec_, *manifold_);
+    const DrivenRun many = Drive(spec_, *manifold_, {.threads = threads});
     EXPECT_TRUE(SameMesh(*one.mesher, *many.mesher)) << threads << " threads";
     ASSERT_EQ(many.deltas.size(), one.deltas.size());
     for (std::size_t r = 0; r < one.deltas.size(); ++r) {

@@ -189,9 +189,7 @@ TEST(GivenSize, IsSampledByALatticeWhereItChangesSlowly) {
   // Ring by ring, and without simplices meanwhile.
   EXPECT_GT(run.deltas[2].first_vertex, run.deltas[1].first_vertex);
   EXPECT_TRUE(run.deltas[2].added.empty());
-  Specification threads = spec;
-  threads.threads = 3;
-  EXPECT_TRUE(SameMesh(*run.mesher, *Drive(threads, *torus).mesher));
+  EXPECT_TRUE(SameMesh(*run.mesher, *Drive(spec, *torus, {.threads = 3}).mesher));
 }
 
 // A lattice cannot follow it, and is given up before it costs rounds.
@@ -264,10 +262,8 @@ TEST(GivenSize, IsGuessedInASpeculativeRun) {
 TEST(GivenSize, IsDeterministicHoweverItIsCut) {
   const auto torus = Make("torus:1:0.9");
   Specification spec = SizedSpec(*torus, 0.5, 0.5);
-  spec.threads = 1;
-  const DrivenRun one = Drive(spec, *torus);
-  spec.threads = 3;
-  EXPECT_TRUE(SameMesh(*one.mesher, *Drive(spec, *torus).mesher));
+  const DrivenRun one = Drive(spec, *torus, {.threads = 1});
+  EXPECT_TRUE(SameMesh(*one.mesher, *Drive(spec, *torus, {.threads = 3}).mesher));
   spec.limits.max_batch_queries = 7;
   const DrivenRun cut = Drive(spec, *torus);
   EXPECT_EQ(cut.mesher->Points(), one.mesher->Points());

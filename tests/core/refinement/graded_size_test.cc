@@ -125,10 +125,8 @@ TEST(GradedSize, IsDeterministicForAnyNumberOfThreads) {
   const auto torus = Make("torus:1:0.9");
   Specification spec = SpecificationFor(*torus, 0.5);
   spec.criteria.size_rate = 0.5;
-  spec.threads = 1;
-  const DrivenRun one = Drive(spec, *torus);
-  spec.threads = 3;
-  EXPECT_TRUE(SameMesh(*one.mesher, *Drive(spec, *torus).mesher));
+  const DrivenRun one = Drive(spec, *torus, {.threads = 1});
+  EXPECT_TRUE(SameMesh(*one.mesher, *Drive(spec, *torus, {.threads = 3}).mesher));
 }
 
 TEST(GradedSize, IsNoFinerThanEpsilonWhereNothingBends) {

@@ -98,9 +98,8 @@ class AtALookUp : public ::testing::Test {
   };
 
   static Ended Run(Specification spec, const testing::Answerer& answer, std::uint64_t at) {
-    spec.threads = 1;
     Ended run;
-    run.mesher = NewMesher(spec);
+    run.mesher = NewMesher(spec, {.threads = 1});
     looking_up = run.mesher.get();
     look_ups = 0;
     interrupt_at = at;

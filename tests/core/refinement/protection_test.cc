@@ -38,8 +38,7 @@ TEST_P(Protected, IsReachedWithFewMoreVertices) {
   EXPECT_FALSE(plain.report().certificate.protection);
   EXPECT_EQ(plain.report().counts.inserted_protection, 0u);
   spec.criteria.protection = GetParam().protection;
-  spec.threads = 1;
-  const DrivenRun run = Drive(spec, *manifold);
+  const DrivenRun run = Drive(spec, *manifold, {.threads = 1});
   const Certificate& c = run.report().certificate;
   ASSERT_TRUE(c.certified) << c.verdict;
   ASSERT_TRUE(c.protection);
@@ -56,8 +55,7 @@ TEST_P(Protected, IsReachedWithFewMoreVertices) {
   EXPECT_LE(static_cast<double>(run.report().counts.vertices), GetParam().most * vertices);
   EXPECT_EQ(run.mesher->progress().bad_protection, 0u);
 
-  spec.threads = 3;
-  EXPECT_TRUE(testing::SameMesh(*run.mesher, *Drive(spec, *manifold).mesher));
+  EXPECT_TRUE(testing::SameMesh(*run.mesher, *Drive(spec, *manifold, {.threads = 3}).mesher));
 }
 
 INSTANTIATE_TEST_SUITE_P(Catalogue, Protected,

@@ -42,8 +42,8 @@ using Change = std::function<void(const QueryBlock&, AnswerBlock*)>;
 
 // `change`, if given, makes the answers wrong.
 Expected<LabelledMesh> MeshOf(Domain domain, const Specification& spec,
-                              const Change& change = nullptr) {
-  auto created = Mesher::Create(spec);
+                              const Change& change = nullptr, Execution execution = {}) {
+  auto created = Mesher::Create(spec, execution);
   if (!created) return tl::unexpected<Status>(created.error());
   Mesher& mesher = **created;
   while (const auto batch = mesher.NextBatch()) {
@@ -415,11 +415,9 @@ TEST(Arrangements, ChangesAddUpToTheMesh) {
 // The same mesh, bit for bit, for any number of threads.
 TEST(Arrangements, DoNotDependOnThreads) {
   const Arrangement venn = testing::SpaceArrangements()[1];
-  Specification spec = venn.SpecificationFor(0.4);
-  spec.threads = 1;
-  const auto one = MeshOf(venn.domain, spec);
-  spec.threads = 3;
-  const auto three = MeshOf(venn.domain, spec);
+  const Specification spec = venn.SpecificationFor(0.4);
+  const auto one = MeshOf(venn.domain, spec, nullptr, {.threads = 1});
+  const auto three = MeshOf(venn.domain, spec, nullptr, {.threads = 3});
   ASSERT_TRUE(one && three);
   EXPECT_EQ(one->points, three->points);
   EXPECT_EQ(one->regions, three->regions);

@@ -53,9 +53,9 @@ struct Boundary {
   }
 };
 
-Boundary BoundaryOf(Domain domain, Specification spec) {
+Boundary BoundaryOf(Domain domain, Specification spec, Execution execution = {}) {
   spec.boundary_only = true;
-  auto created = Mesher::Create(spec);
+  auto created = Mesher::Create(spec, execution);
   if (!created) throw std::runtime_error(created.error().message);
   Mesher& mesher = **created;
   Boundary mesh;
@@ -459,11 +459,9 @@ TEST(BoundaryOnly, WrongAnswersAreNotCertified) {
 
 TEST(BoundaryOnly, DoesNotDependOnThreads) {
   const Arrangement venn = stellate::testing::SpaceArrangements()[5];
-  Specification spec = venn.SpecificationFor(0.4);
-  spec.threads = 1;
-  const Boundary one = BoundaryOf(venn.domain, spec);
-  spec.threads = 3;
-  const Boundary three = BoundaryOf(venn.domain, spec);
+  const Specification spec = venn.SpecificationFor(0.4);
+  const Boundary one = BoundaryOf(venn.domain, spec, {.threads = 1});
+  const Boundary three = BoundaryOf(venn.domain, spec, {.threads = 3});
   EXPECT_EQ(one.points, three.points);
   EXPECT_EQ(one.simplices, three.simplices);
 }

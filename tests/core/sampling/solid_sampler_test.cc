@@ -26,7 +26,9 @@ core::testing::Answerer Answering(Domain& m) {
   return [&m](const QueryBatch& batch) { return m.AnswersOf(batch); };
 }
 
-DrivenRun MeshOfDomain(Domain m, const Specification& spec) { return Drive(spec, Answering(m)); }
+DrivenRun MeshOfDomain(Domain m, const Specification& spec, Execution execution = {}) {
+  return Drive(spec, Answering(m), execution);
+}
 
 // What the deltas add up to.
 std::set<std::vector<std::uint32_t>> SimplicesOf(const DrivenRun& run, int k) {
@@ -89,11 +91,9 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST(InteriorLaying, IsTheSameForAnyThreads) {
   for (const Domain& m : {Ball(), HalfSphere3(), BoxMinusBall()}) {
-    Specification spec = m.SpecificationFor(0.25);
-    spec.threads = 1;
-    const DrivenRun one = MeshOfDomain(m, spec);
-    spec.threads = 4;
-    const DrivenRun many = MeshOfDomain(m, spec);
+    const Specification spec = m.SpecificationFor(0.25);
+    const DrivenRun one = MeshOfDomain(m, spec, {.threads = 1});
+    const DrivenRun many = MeshOfDomain(m, spec, {.threads = 4});
     EXPECT_TRUE(SameMesh(*one.mesher, *many.mesher));
   }
 }

@@ -64,10 +64,8 @@ TEST_P(SpeculativeRun, TakesFarFewerRoundsForAsGoodAMesh) {
 TEST_P(SpeculativeRun, IsDeterministicForAnyNumberOfThreads) {
   const auto manifold = Make(GetParam().manifold);
   Specification spec = Spec(*manifold);
-  spec.threads = 1;
-  const DrivenRun one = Drive(spec, *manifold);
-  spec.threads = 3;
-  const DrivenRun three = Drive(spec, *manifold);
+  const DrivenRun one = Drive(spec, *manifold, {.threads = 1});
+  const DrivenRun three = Drive(spec, *manifold, {.threads = 3});
   EXPECT_EQ(one.mesher->Points(), three.mesher->Points());
   EXPECT_EQ(one.mesher->Simplices(), three.mesher->Simplices());
 }

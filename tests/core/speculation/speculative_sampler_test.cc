@@ -62,10 +62,8 @@ TEST_P(SpeculativeSample, TakesAHandfulOfRoundsAndHardlyMoreVertices) {
 TEST_P(SpeculativeSample, IsTheSameForAnyNumberOfThreads) {
   const auto manifold = Make(GetParam().manifold);
   Specification spec = AheadOn(*manifold, GetParam().epsilon);
-  spec.threads = 1;
-  const DrivenRun one = Drive(spec, *manifold);
-  spec.threads = 3;
-  EXPECT_TRUE(SameMesh(*one.mesher, *Drive(spec, *manifold).mesher));
+  const DrivenRun one = Drive(spec, *manifold, {.threads = 1});
+  EXPECT_TRUE(SameMesh(*one.mesher, *Drive(spec, *manifold, {.threads = 3}).mesher));
 }
 
 INSTANTIATE_TEST_SUITE_P(Catalogue, SpeculativeSample,
@@ -80,8 +78,7 @@ TEST(SpeculativeSampler, LeavesToRingsWhatCannotBeGuessed) {
   Specification spec = AheadOn(*torus, 0.4);
   const DrivenRun ahead = Drive(spec, *torus);
   ExpectGoodMesh(ahead, torus->facts());
-  spec.threads = 3;
-  EXPECT_TRUE(SameMesh(*ahead.mesher, *Drive(spec, *torus).mesher));
+  EXPECT_TRUE(SameMesh(*ahead.mesher, *Drive(spec, *torus, {.threads = 3}).mesher));
   spec.criteria.speculative = false;
   const DrivenRun plain = Drive(spec, *torus);
   EXPECT_LT(static_cast<double>(ahead.report().counts.vertices),
@@ -129,10 +126,8 @@ TEST_P(FewSeeds, GiveTheSameForAnyNumberOfThreads) {
   const auto manifold = Make(c.manifold);
   Specification spec = Seeded(*manifold, c.epsilon, count);
   spec.criteria.speculative = true;
-  spec.threads = 1;
-  const DrivenRun one = Drive(spec, *manifold);
-  spec.threads = 3;
-  EXPECT_TRUE(SameMesh(*one.mesher, *Drive(spec, *manifold).mesher));
+  const DrivenRun one = Drive(spec, *manifold, {.threads = 1});
+  EXPECT_TRUE(SameMesh(*one.mesher, *Drive(spec, *manifold, {.threads = 3}).mesher));
 }
 
 INSTANTIATE_TEST_SUITE_P(Sampler, FewSeeds,

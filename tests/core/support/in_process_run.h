@@ -34,8 +34,8 @@ struct DrivenRun {
   const Report& report() const { return mesher->report(); }
 };
 
-inline std::unique_ptr<Mesher> NewMesher(const Specification& spec) {
-  auto mesher = Mesher::Create(spec);
+inline std::unique_ptr<Mesher> NewMesher(const Specification& spec, Execution execution = {}) {
+  auto mesher = Mesher::Create(spec, execution);
   if (!mesher) throw std::runtime_error(mesher.error().message);
   return std::move(*mesher);
 }
@@ -46,14 +46,15 @@ inline MeshDelta Step(Mesher& mesher, const Answerer& answer) {
   return std::move(*delta);
 }
 
-inline DrivenRun Drive(const Specification& spec, const Answerer& answer) {
-  DrivenRun run{NewMesher(spec), {}};
+inline DrivenRun Drive(const Specification& spec, const Answerer& answer,
+                       Execution execution = {}) {
+  DrivenRun run{NewMesher(spec, execution), {}};
   while (run.mesher->NextBatch()) run.deltas.push_back(Step(*run.mesher, answer));
   return run;
 }
 
-inline DrivenRun Drive(const Specification& spec, Oracle& oracle) {
-  return Drive(spec, AnswererFor(oracle));
+inline DrivenRun Drive(const Specification& spec, Oracle& oracle, Execution execution = {}) {
+  return Drive(spec, AnswererFor(oracle), execution);
 }
 
 // Bit for bit: points, tangents, simplices, and how the run went.

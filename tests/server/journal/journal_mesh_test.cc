@@ -88,7 +88,7 @@ TEST_F(JournalTest, AFinishedMeshIsServedFromTheDisk) {
   const auto budget = std::make_shared<MemoryBudget>(MemoryBudget::Limits{bytes / 2, 0});
   SessionOptions reopened = meshes.at(0);
   meshes[0].ports.memory = MemoryBudget::Open(budget, "");
-  Session session(std::move(meshes[0]), [](core::Specification) {
+  Session session(std::move(meshes[0]), [](core::Specification, core::Execution) {
     ADD_FAILURE() << "nobody needs a mesher";
     return core::Refuse(core::StatusCode::kInvalidArgument, "none");
   });
@@ -211,9 +211,9 @@ TEST_F(JournalTest, ARevisionThatAReplayLosesWasSeenNevertheless) {
   const auto journal = Open();
   auto meshes = journal->TakeMeshes();
   const std::uint64_t rounds = meshes.at(0).record->rounds;
-  Session session(std::move(meshes[0]), [](core::Specification spec) {
+  Session session(std::move(meshes[0]), [](core::Specification spec, core::Execution execution) {
     spec.seeds *= -1;
-    return core::Mesher::Create(std::move(spec));
+    return core::Mesher::Create(std::move(spec), execution);
   });
   session.Run();
   EXPECT_EQ(session.View().state, SessionState::kFailed);

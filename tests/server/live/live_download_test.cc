@@ -277,9 +277,9 @@ class TwoVersions : public LiveDownloadTest {
     Config config;
     config.data_dir = directory_;
     config.listen = "unix:" + directory_ + "/socket";
-    auto other = Server::Start(config, [](core::Specification spec) {
+    auto other = Server::Start(config, [](core::Specification spec, core::Execution execution) {
       spec.random_seed += 1;
-      return core::Mesher::Create(std::move(spec));
+      return core::Mesher::Create(std::move(spec), execution);
     });
     ASSERT_TRUE(other) << other.error().message;
     server_ = std::move(*other);

@@ -33,14 +33,14 @@ class ReplayQueue : public JournalTest {
 
   // A mesher that notes how many of its kind there are, and waits in the first round to be let go.
   Session::MesherFactory Counting() {
-    return [this](core::Specification spec) {
+    return [this](core::Specification spec, core::Execution execution) {
       {
         std::unique_lock lock(mutex_);
         most_ = std::max(most_, ++meshing_);
         changed_.notify_all();
         changed_.wait(lock, [this] { return go_; });
       }
-      return core::Mesher::Create(std::move(spec));
+      return core::Mesher::Create(std::move(spec), execution);
     };
   }
   void WaitForMeshers(int count) {

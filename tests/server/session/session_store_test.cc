@@ -174,7 +174,7 @@ TEST(SessionStore, MeshesBeingTakenApartTakeNoPlaceButAreBounded) {
   constexpr std::size_t kMostEnding = 16;
   std::promise<void> gate;
   SessionStore store({1, 100, 1h},
-                     [future = gate.get_future().share()](core::Specification spec)
+                     [future = gate.get_future().share()](core::Specification spec, core::Execution)
                          -> core::Expected<std::unique_ptr<core::Mesher>> {
                        return std::make_unique<SlowToGo>(std::move(spec), future);
                      });
@@ -281,12 +281,12 @@ class SweepTest : public ::testing::Test {
 
   static constexpr double kBarren = 0.2;  // an epsilon that gives no vertices
   const TimePoint now_ = Clock::now();
-  SessionStore store_{
-      {100, kKept, 1h},
-      [](core::Specification spec) -> core::Expected<std::unique_ptr<core::Mesher>> {
-        const std::uint64_t vertices = spec.epsilon == kBarren ? 0 : 3;
-        return std::make_unique<Founded>(std::move(spec), vertices);
-      }};
+  SessionStore store_{{100, kKept, 1h},
+                      [](core::Specification spec,
+                         core::Execution) -> core::Expected<std::unique_ptr<core::Mesher>> {
+                        const std::uint64_t vertices = spec.epsilon == kBarren ? 0 : 3;
+                        return std::make_unique<Founded>(std::move(spec), vertices);
+                      }};
 };
 
 TEST_F(SweepTest, OneOwnersMeshesPushOutNoneOfAnothers) {

@@ -70,7 +70,8 @@ class FakeMesher : public stellate::testing::StubMesher {
 };
 
 Session::MesherFactory Faking(FakeMesher::Plan plan) {
-  return [plan](core::Specification spec) -> core::Expected<std::unique_ptr<core::Mesher>> {
+  return [plan](core::Specification spec,
+                core::Execution) -> core::Expected<std::unique_ptr<core::Mesher>> {
     return std::make_unique<FakeMesher>(std::move(spec), plan);
   };
 }
@@ -220,9 +221,10 @@ TEST(Session, AMeshThatOutgrowsTheMemoryFailsAndGivesItBack) {
 }
 
 TEST(Session, ARefusedSpecificationFailsTheMesh) {
-  Running running([](core::Specification) -> core::Expected<std::unique_ptr<core::Mesher>> {
-    return core::Refuse(core::StatusCode::kInvalidArgument, "epsilon is wrong");
-  });
+  Running running(
+      [](core::Specification, core::Execution) -> core::Expected<std::unique_ptr<core::Mesher>> {
+        return core::Refuse(core::StatusCode::kInvalidArgument, "epsilon is wrong");
+      });
   const SessionView view = running.Finish();
   EXPECT_EQ(view.state, SessionState::kFailed);
   EXPECT_EQ(view.failure.reason, FailureReason::kInvalidArgument);

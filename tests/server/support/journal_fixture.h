@@ -101,7 +101,6 @@ inline SessionOptions RecordedSphere(std::shared_ptr<SessionJournal> journal,
   options.request.about = "fitted to nothing";
   options.request.scale = Eigen::Vector3d(0.01, 500, 1);
   options.request.spec = SphereSpec(epsilon);
-  options.request.spec.threads = 1;  // oneTBB itself is not built for ThreadSanitizer
   options.request.spec.seeds = Eigen::Vector3d::UnitX();
   options.request.spec.criteria.advance_step = 0.9;
   options.request.spec.criteria.centre_rule = core::CentreRule::kCommonCentre;
@@ -167,6 +166,7 @@ inline void Read(const MeshHistory& history, Outcome* outcome) {
 
 // Runs a mesh until it ends, or until `stop_at` revisions are out and the server stops.
 inline Outcome RunMesh(SessionOptions options, std::uint64_t stop_at = 0, bool with_worker = true) {
+  options.policy.execution.threads = 1;  // oneTBB itself is not built for ThreadSanitizer
   Session session(std::move(options));
   if (!session.Over()) {
     std::thread thread([&] { session.Run(); });
