@@ -79,6 +79,13 @@ std::vector<StarCuts> InTurns(const std::vector<StarCut>& cuts) {
   return turns;
 }
 
+// Among `count` ascending ids, with a place for one more. GCC 12 warns of std::sort of so few.
+void InsertId(std::uint32_t id, std::uint32_t* ids, int* count) {
+  int at = (*count)++;
+  for (; at > 0 && ids[at - 1] > id; --at) ids[at] = ids[at - 1];
+  ids[at] = id;
+}
+
 }  // namespace
 
 // Calls visit(v, simplex) once for each simplex of a sector of star(p) whose lowest vertex is p: at
@@ -187,12 +194,11 @@ typename Stars<K>::FaceSimplex Stars<K>::FaceSimplexOf(std::uint32_t p, const Ce
     else if (IsWall(id))
       simplex.walls |= SetOfWall(WallOf(id));
     else
-      simplex.ids[static_cast<std::size_t>(simplex.count++)] = id;
+      InsertId(id, simplex.ids.data(), &simplex.count);
   }
   simplex.codimension = CountWalls(simplex.walls);
   simplex.walls = sample_.sectors().labels().Close(simplex.walls);
   const auto end = simplex.ids.begin() + simplex.count;
-  std::sort(simplex.ids.begin(), end);
   simplex.foreign = std::any_of(simplex.ids.begin(), end, [&](std::uint32_t id) {
     return !IsSubset(simplex.walls, id == size() ? guest_walls : sample_.walls(id));
   });
