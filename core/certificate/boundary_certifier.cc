@@ -5,7 +5,7 @@
 #include <optional>
 #include <utility>
 
-#include "core/certificate/certifier_rounds.h"
+#include "core/certificate/certifier.h"
 #include "core/certificate/claims/boundary_claims.h"
 #include "core/certificate/claims/sheet_claims.h"
 #include "core/certificate/claims/surface_claims.h"
@@ -16,10 +16,10 @@ namespace {
 // The constructor decides what needs no oracle; then comes one round: barycentres of simplices, and
 // points beside the boundary, from which each wall is queried. All answers, and those that were
 // known before, are compared with the mesh.
-class BoundaryRounds final : public CertifierRounds {
+class BoundaryCertifier final : public Certifier {
  public:
-  BoundaryRounds(const Specification& spec, const MeshView& mesh, const StarFacts& facts,
-                 KnownOfManifold known)
+  BoundaryCertifier(const Specification& spec, const MeshView& mesh, const StarFacts& facts,
+                    KnownOfManifold known)
       : x_(spec, mesh, facts), known_(std::move(known)), surface_(x_), boundary_(x_) {
     if (surface_.Judge())
       Ask();
@@ -27,8 +27,8 @@ class BoundaryRounds final : public CertifierRounds {
       Finish();
   }
 
-  const std::vector<QueryBlock>* NextBlocks() const override {
-    return finished_ ? nullptr : &blocks_;
+  std::vector<QueryBlock> Questions() override {
+    return finished_ ? std::vector<QueryBlock>() : blocks_;
   }
 
   void Absorb(const std::vector<AnswerBlock>& answers) override {
@@ -38,8 +38,8 @@ class BoundaryRounds final : public CertifierRounds {
   }
 
   const Certificate& certificate() const override { return x_.certificate; }
-  const std::vector<double>& wanted() const override { return x_.wanted; }
-  const PointsOnWalls& wanted_on_walls() const override { return x_.wanted_on_walls; }
+  const std::vector<double>& Uncovered() const override { return x_.wanted; }
+  const PointsOnWalls& UncoveredOnWalls() const override { return x_.wanted_on_walls; }
   KnownOfManifold TakeKnown() override {
     known_.tangential_offsets.clear();
     return std::move(known_);
@@ -100,9 +100,11 @@ class BoundaryRounds final : public CertifierRounds {
 
 }  // namespace
 
-std::unique_ptr<CertifierRounds> RoundsForBoundary(const Specification& spec, const MeshView& mesh,
-                                                   const StarFacts& facts, KnownOfManifold known) {
-  return std::make_unique<BoundaryRounds>(spec, mesh, facts, std::move(known));
+std::unique_ptr<Certifier> Certifier::CreateForBoundary(const Specification& spec,
+                                                        const MeshView& mesh,
+                                                        const StarFacts& facts,
+                                                        KnownOfManifold known) {
+  return std::make_unique<BoundaryCertifier>(spec, mesh, facts, std::move(known));
 }
 
 }  // namespace stellate::core

@@ -31,10 +31,10 @@ namespace {
 //      boundary; shorter steps where small ones went wrong;
 //   3. in a thorough audit, balls at the barycentres' closest points as well.
 // All answers, and those that were known before, are then compared with the mesh.
-class WholeRounds final : public CertifierRounds {
+class MeshCertifier final : public Certifier {
  public:
-  WholeRounds(const Specification& spec, const MeshView& mesh, const StarFacts& facts,
-              KnownOfManifold known)
+  MeshCertifier(const Specification& spec, const MeshView& mesh, const StarFacts& facts,
+                KnownOfManifold known)
       : x_(spec, mesh, facts) {
     x_.seen = std::move(known.points);
     ends_ = std::move(known.ends);
@@ -49,8 +49,8 @@ class WholeRounds final : public CertifierRounds {
     }
   }
 
-  const std::vector<QueryBlock>* NextBlocks() const override {
-    return finished_ ? nullptr : &blocks_;
+  std::vector<QueryBlock> Questions() override {
+    return finished_ ? std::vector<QueryBlock>() : blocks_;
   }
 
   void Absorb(const std::vector<AnswerBlock>& answers) override {
@@ -66,8 +66,8 @@ class WholeRounds final : public CertifierRounds {
   }
 
   const Certificate& certificate() const override { return x_.certificate; }
-  const std::vector<double>& wanted() const override { return x_.wanted; }
-  const PointsOnWalls& wanted_on_walls() const override { return x_.wanted_on_walls; }
+  const std::vector<double>& Uncovered() const override { return x_.wanted; }
+  const PointsOnWalls& UncoveredOnWalls() const override { return x_.wanted_on_walls; }
   KnownOfManifold TakeKnown() override {
     return {std::move(x_.seen), {}, std::move(ends_), std::move(clear_)};
   }
@@ -252,23 +252,10 @@ class WholeRounds final : public CertifierRounds {
 
 }  // namespace
 
-Certifier::Certifier(const Specification& spec, const MeshView& mesh, const StarFacts& facts,
-                     KnownOfManifold known) {
-  if (spec.boundary_only)
-    rounds_ = RoundsForBoundary(spec, mesh, facts, std::move(known));
-  else
-    rounds_ = std::make_unique<WholeRounds>(spec, mesh, facts, std::move(known));
+std::unique_ptr<Certifier> Certifier::Create(const Specification& spec, const MeshView& mesh,
+                                             const StarFacts& facts, KnownOfManifold known) {
+  if (spec.boundary_only) return CreateForBoundary(spec, mesh, facts, std::move(known));
+  return std::make_unique<MeshCertifier>(spec, mesh, facts, std::move(known));
 }
-Certifier::~Certifier() = default;
-
-std::vector<QueryBlock> Certifier::Questions() {
-  const std::vector<QueryBlock>* blocks = rounds_->NextBlocks();
-  return blocks ? *blocks : std::vector<QueryBlock>();
-}
-void Certifier::Absorb(const std::vector<AnswerBlock>& answers) { rounds_->Absorb(answers); }
-const Certificate& Certifier::certificate() const { return rounds_->certificate(); }
-const std::vector<double>& Certifier::Uncovered() const { return rounds_->wanted(); }
-const PointsOnWalls& Certifier::UncoveredOnWalls() const { return rounds_->wanted_on_walls(); }
-KnownOfManifold Certifier::TakeKnown() { return rounds_->TakeKnown(); }
 
 }  // namespace stellate::core

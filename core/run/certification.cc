@@ -95,7 +95,8 @@ Certification::Certification(const Specification& spec, MeshView mesh,
                              KnownOfManifold known, std::optional<BoundaryOfMesh> boundary)
     : simplices_(std::move(simplices)),
       boundary_(std::move(boundary)),
-      certifier_(spec, WithSimplices(mesh, simplices_, boundary_), facts, std::move(known)) {}
+      certifier_(Certifier::Create(spec, WithSimplices(mesh, simplices_, boundary_), facts,
+                                   std::move(known))) {}
 
 // Adds to the faces of one wall what the simplices that end there would tell.
 template <int K>

@@ -2,11 +2,11 @@
 
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <vector>
 
 #include "core/certificate/certifier.h"
-#include "core/query_source.h"
 #include "core/refinement/engine.h"
 
 namespace stellate::core {
@@ -32,8 +32,8 @@ struct BoundaryOfMesh {
 template <int K>
 std::optional<BoundaryOfMesh> BoundaryOf(const Engine<K>& engine);
 
-// Queries what the certificate needs, and owns it.
-class Certification final : public QuerySource {
+// Owns the certifier of a run's mesh, with the simplices and the boundary that it reads.
+class Certification {
  public:
   // spec      borrowed
   // mesh      its points and tangents are borrowed and must not change; its simplices are set here
@@ -43,19 +43,12 @@ class Certification final : public QuerySource {
                 const StarFacts& facts, KnownOfManifold known,
                 std::optional<BoundaryOfMesh> boundary = std::nullopt);
 
-  std::vector<QueryBlock> Questions() override { return certifier_.Questions(); }
-  void Absorb(const std::vector<AnswerBlock>& answers) override { certifier_.Absorb(answers); }
-
-  // Once there are no more questions; see Certifier.
-  const Certificate& certificate() const { return certifier_.certificate(); }
-  const std::vector<double>& Uncovered() const { return certifier_.Uncovered(); }
-  const PointsOnWalls& UncoveredOnWalls() const { return certifier_.UncoveredOnWalls(); }
-  KnownOfManifold TakeKnown() { return certifier_.TakeKnown(); }
+  Certifier& certifier() const { return *certifier_; }
 
  private:
   std::vector<std::uint32_t> simplices_;
   std::optional<BoundaryOfMesh> boundary_;
-  Certifier certifier_;
+  std::unique_ptr<Certifier> certifier_;
 };
 
 }  // namespace stellate::core

@@ -48,12 +48,12 @@ class CurrentSource final : public QuerySource {
 
   // One of these is null.
   const RoundTrip<K>* trip() const { return trip_.get(); }
-  Certification* certification() const { return certification_.get(); }
+  Certifier* certifier() const { return certification_ ? &certification_->certifier() : nullptr; }
   Purpose purpose() const { return purpose_; }  // of the trip
   TangentFinder& finder() { return finder_; }
 
  private:
-  QuerySource& source() { return trip_ ? static_cast<QuerySource&>(*trip_) : *certification_; }
+  QuerySource& source() { return trip_ ? static_cast<QuerySource&>(*trip_) : *certifier(); }
 
   const OracleCapabilities oracle_;
   TangentFinder finder_;

@@ -84,7 +84,7 @@ void Scheduler<K>::CountQueries(std::uint64_t count) {
 
 template <int K>
 void Scheduler<K>::Measure(Progress* progress) {
-  counts_.meter.Measure<K>(engine_, source_.certification() != nullptr, sample_.CountMissing(),
+  counts_.meter.Measure<K>(engine_, source_.certifier() != nullptr, sample_.CountMissing(),
                            progress);
 }
 
@@ -235,9 +235,9 @@ void Scheduler<K>::Certify() {
 template <int K>
 void Scheduler<K>::AfterCertificate() {
   if (engine_.filled().is_handed_out() ||
-      source_.certification()->certificate().epsilon_over_reach > kCoarse ||
-      !(AskForSparesOnWalls(source_.certification()->UncoveredOnWalls()) ||
-        AskForSpares(source_.certification()->Uncovered())))
+      source_.certifier()->certificate().epsilon_over_reach > kCoarse ||
+      !(AskForSparesOnWalls(source_.certifier()->UncoveredOnWalls()) ||
+        AskForSpares(source_.certifier()->Uncovered())))
     End(Termination::kConverged);
 }
 
@@ -247,7 +247,7 @@ bool Scheduler<K>::AskForSpares(const std::vector<double>& points) {
   Eigen::MatrixXd chosen =
       spare_points_.Choose(points, engine_.stars(), engine_.criteria().epsilon);
   if (chosen.cols() == 0) return false;
-  if (source_.certification()) spare_points_.GiveBack(source_.certification()->TakeKnown());
+  if (source_.certifier()) spare_points_.GiveBack(source_.certifier()->TakeKnown());
   AskFor(std::move(chosen), Purpose::kSpares);
   return true;
 }

@@ -16,8 +16,7 @@ void Scheduler<K>::End(Termination termination) {
   if (may_be_creased && !creases_.is_asking()) {
     if (termination == Termination::kNoProgress)
       creases_.ProbeFaults(engine_);
-    else if (source_.certification() &&
-             source_.certification()->certificate().epsilon_over_reach > kCoarse)
+    else if (source_.certifier() && source_.certifier()->certificate().epsilon_over_reach > kCoarse)
       creases_.ProbeAll(engine_.stars());
   }
   if (!may_be_creased || !creases_.is_asking()) return Finish(termination);
@@ -48,7 +47,7 @@ void Scheduler<K>::DescribeEnding() {
   const Termination termination = end_.outcome->termination;
   Certificate& certificate = end_.outcome->certificate;
   if (termination == Termination::kConverged) {
-    certificate = source_.certification()->certificate();
+    certificate = source_.certifier()->certificate();
     WarnOfCompromises<K>(engine_, spec_.epsilon, &certificate);
     // It may be the cause of all other problems.
     if (creases_.crease()) {
@@ -58,8 +57,8 @@ void Scheduler<K>::DescribeEnding() {
   } else {
     certificate.verdict =
         Message("not certified: the run ended as ", TerminationName(termination),
-                source_.certification() ? " when every rule held, before it was certified"
-                                        : " before every rule held");
+                source_.certifier() ? " when every rule held, before it was certified"
+                                    : " before every rule held");
     if (!end_.outcome->failure.message.empty())
       certificate.verdict += ": " + end_.outcome->failure.message;
     if (termination == Termination::kVertexBudget)

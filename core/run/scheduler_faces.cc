@@ -89,7 +89,7 @@ bool Scheduler<K>::AskForSparesOnWalls(const PointsOnWalls& points) {
   if (candidates.planned.size() == 0) return false;
   noticed_.piece = {std::countr_zero(candidates.planned.walls.front()),
                     candidates.planned.points.col(0)};
-  spare_points_.GiveBack(source_.certification()->TakeKnown());
+  spare_points_.GiveBack(source_.certifier()->TakeKnown());
   Ask(std::move(candidates), Purpose::kSpares);
   return true;
 }

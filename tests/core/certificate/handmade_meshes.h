@@ -8,6 +8,7 @@
 #include <cstdint>
 #include <functional>
 #include <map>
+#include <memory>
 #include <numbers>
 #include <set>
 #include <vector>
@@ -246,8 +247,9 @@ inline CertifiedRun Certify(
     const std::function<Eigen::MatrixXd(const Eigen::VectorXd&)>& tangent = nullptr,
     KnownOfManifold known = {}) {
   CertifiedRun run;
-  Certifier certifier(spec, mesh.View(), facts, std::move(known));
-  for (std::vector<QueryBlock> blocks; !(blocks = certifier.Questions()).empty();) {
+  const std::unique_ptr<Certifier> certifier =
+      Certifier::Create(spec, mesh.View(), facts, std::move(known));
+  for (std::vector<QueryBlock> blocks; !(blocks = certifier->Questions()).empty();) {
     ++run.rounds;
     std::vector<AnswerBlock> answers;
     for (const QueryBlock& block : blocks) {
@@ -268,9 +270,9 @@ inline CertifiedRun Certify(
       run.queries += block.size();
       answers.push_back(std::move(answer));
     }
-    certifier.Absorb(answers);
+    certifier->Absorb(answers);
   }
-  run.certificate = certifier.certificate();
+  run.certificate = certifier->certificate();
   return run;
 }
 
