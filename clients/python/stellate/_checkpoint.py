@@ -185,6 +185,7 @@ class Checkpoint:
                 walls,
                 labels=labels,
                 region_names=tuple(spec.region_names),
+                scale=tuple(spec.scale),
             )
         except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile) as error:
             raise InvalidArgument(

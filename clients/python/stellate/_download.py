@@ -186,6 +186,7 @@ def assemble(client: Client, info: MeshInfo, revision: int, on_part: OnPart | No
         _places(codes, vertices),
         np.concatenate(smoothed) if sum(map(len, smoothed)) == vertices > 0 else None,
         info.region_names,
+        scale=info.scale,
     )
     return with_report(mesh, info.report if last else None)
 

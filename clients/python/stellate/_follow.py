@@ -31,7 +31,7 @@ class Following:
     ) -> None:
         self._on_progress, self._every = on_progress, every
         self._growth = DeltaMesh(info.dimension, info.ambient_dimension, info.boundary_only)
-        self._region_names = info.region_names
+        self._region_names, self._scale = info.region_names, info.scale
         self._watch = client.watch(info.name)
         self._watch.on_resume = self._growth.forget_pending
         self._progress: Progress | None = None
@@ -74,6 +74,7 @@ class Following:
             growth.walls(),
             labels=growth.labels(),
             region_names=self._region_names,
+            scale=self._scale,
         )
 
     def stop(self) -> None:
@@ -159,6 +160,7 @@ def _finished(growth: DeltaMesh, final: MeshInfo) -> FinishedMesh:
             orientation,
             growth.labels(),
             region_names=final.region_names,
+            scale=final.scale,
         ),
         final.report,
     )

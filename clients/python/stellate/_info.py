@@ -35,6 +35,9 @@ class MeshInfo:
     owner: str = ""  # known to administrators of the server alone
     boundary_only: bool = False  # its simplices are those of the boundary, each with two labels
     region_names: tuple[str, ...] = ()  # of the labels 1, 2, ...; "": none
+    scale: tuple[
+        float, ...
+    ] = ()  # d lengths: what is meshed is x / scale, and its points come in x
 
     @property
     def over(self) -> bool:
@@ -68,6 +71,7 @@ class MeshInfo:
             owner=mesh.owner,
             boundary_only=mesh.spec.boundary_only,
             region_names=tuple(mesh.spec.region_names),
+            scale=tuple(mesh.spec.scale),
         )
 
 

@@ -51,6 +51,8 @@ class Mesh:
       name: by which it is on its server still, "meshes/...", where it was asked to stay
         (`stellate.mesh(..., keep_on_server=True)`); else "".
       coordinate_names: d, as the oracle or the table of the points had them; () where there are none.
+      scale: of a mesh made with `scale`, d: `points` are in x, and what was meshed is x / scale, whose
+        lengths and angles the report says; else ().
     """
 
     points: np.ndarray
@@ -66,6 +68,7 @@ class Mesh:
     region_names: tuple[str, ...] = ()
     name: str = ""
     coordinate_names: tuple[str, ...] = ()
+    scale: tuple[float, ...] = ()
 
     def region(self, label: int | str) -> Mesh:
         """The part with one label, or with that name, of the same points. Its boundary is where it ends
@@ -90,7 +93,7 @@ class Mesh:
         else:
             rows = self.simplices[self.labels == label]
             part = Mesh(self.points, rows, None, None, self.revision, self.walls)
-        return dataclasses.replace(part, coordinate_names=self.coordinate_names)
+        return dataclasses.replace(part, coordinate_names=self.coordinate_names, scale=self.scale)
 
     @property
     def is_boundary(self) -> bool:
@@ -344,7 +347,7 @@ class Mesh:
         closed. Vertices in the hyperplane itself count as above it; its simplices there are flat.
         """
         heights = self.points @ _slice.as_normal(normal, self.ambient_dimension) - level
-        return Mesh(*_slice.cut(self.points, self.simplices, heights))
+        return Mesh(*_slice.cut(self.points, self.simplices, heights), scale=self.scale)
 
     def unwrap(self, cell: Any) -> PeriodicMesh:
         """A mesh on a periodic cell in plain coordinates, going on from cell to cell.
@@ -511,6 +514,8 @@ def with_report(mesh: Mesh, report: Report | None) -> Mesh:
         mesh.smoothed,
         mesh.region_names,
         mesh.name,
+        mesh.coordinate_names,
+        mesh.scale,
     )
 
 

@@ -159,7 +159,9 @@ def _in_own_coordinates(mesh: FinishedMesh, given: np.ndarray, units: np.ndarray
     points[: len(given)] = given[: len(points)]  # to the last bit
     smoothed = None if mesh.smoothed is None else mesh.smoothed * units
     report = mesh.report.with_line("scale", about_units(units))
-    return dataclasses.replace(mesh, points=points, smoothed=smoothed, report=report)
+    return dataclasses.replace(
+        mesh, points=points, smoothed=smoothed, report=report, scale=tuple(units.tolist())
+    )
 
 
 class _Sending(threading.Thread):

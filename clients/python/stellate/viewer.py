@@ -99,6 +99,7 @@ def _status(mesh: Mesh, label: str) -> pb.Mesh:
     status.spec.dimension = mesh.dimension
     status.spec.ambient_dimension = mesh.ambient_dimension
     status.spec.label = label
+    status.spec.scale.extend(mesh.scale)
     status.progress.vertices = len(mesh.points)
     status.progress.simplices = len(mesh.simplices)
     status.state = pb.MESH_STATE_RUNNING

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <numbers>
 
 #include "stellate/client.h"
@@ -83,6 +84,27 @@ TEST(InUnits, DividesChartsAndTheirDerivatives) {
   const Answer near = scaled.ClosestPoint(Eigen::Vector2d(3, 4));
   EXPECT_TRUE(near.points.isApprox(Eigen::Vector2d(0.6, 0.8), 1e-9)) << near.points;
   EXPECT_EQ(scaled.coordinate_scale(), kScale.head(2));
+}
+
+TEST(InUnits, NamesPlacesInOwnCoordinatesWhereTheOracleRefuses) {
+  const auto f = [](const Eigen::VectorXd& x) {
+    const Eigen::VectorXd y = x.cwiseQuotient(kScale);
+    return Eigen::VectorXd::Constant(1, y[2] - std::sqrt(1 - y[0] * y[0] - y[1] * y[1]));
+  };
+  ImplicitOracle cap(2, 3, f, {}, {-kScale, kScale});
+  std::string words;
+  try {
+    (void)MeshManifold(cap, With(0.2));
+  } catch (const OracleError& error) {
+    words = error.what();
+  }
+  const size_t from = words.find("near [");
+  ASSERT_NE(from, std::string::npos) << words;
+  Eigen::Vector3d near;
+  ASSERT_EQ(std::sscanf(words.c_str() + from, "near [%lf, %lf, %lf]", &near[0], &near[1], &near[2]),
+            3)
+      << words;
+  EXPECT_NEAR(near.cwiseQuotient(kScale).head(2).norm(), 1, 0.05) << words;
 }
 
 TEST(InUnits, TakesOneUnitOfAnyOracleAndRefusesTheRest) {

@@ -77,6 +77,10 @@ def test_the_page_is_given_regions_and_what_became_of_points(tmp_path, command):
     assert delta.added_labels == b"\1\0\2\0" * 20 and status.spec.labels == b"\0\1\2"
     assert status.spec.dimension == 3 and status.spec.boundary_only
 
+    delta, status, _ = shown(scale=(0.5, 4.0, 1.0))  # drawn divided by it, and read in x
+    assert list(status.spec.scale) == [0.5, 4.0, 1.0]
+    assert np.array_equal(np.frombuffer(delta.points.data).reshape(20, 3), bare.points)
+
     _, status, replies = shown(places=np.array(["OK"] * 17 + ["EDGE"] * 3))
     part = stellate_pb2.DownloadMeshResponse.FromString(replies["DownloadMesh"][0])
     assert part.places.codes == bytes(17) + b"\5\5\5"

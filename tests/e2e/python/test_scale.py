@@ -239,6 +239,7 @@ def test_another_scale_is_another_mesh_to_a_checkpoint(tmp_path):
     first = stellate.mesh(ellipsoid(), 0.4, scale=SCALE, checkpoint=tmp_path)
     again = stellate.mesh(ellipsoid(), 0.4, scale=SCALE, checkpoint=tmp_path)
     np.testing.assert_array_equal(first.points, again.points)
+    assert first.scale == again.scale == tuple(SCALE)
     assert str(first.report) == str(again.report)
     with pytest.raises(stellate.InvalidArgument):
         stellate.mesh(ellipsoid(), 0.4, scale=1.01 * SCALE, checkpoint=tmp_path)
@@ -276,6 +277,7 @@ def test_points_alone_are_reconstructed_in_scaled_coordinates(server, rng):
     scaled = stellate.reconstruct(torus * units, 2, scale=units, server=server)
     assert scaled.certified, scaled.report
     assert scaled.points.tobytes() == (torus * units).tobytes()
+    assert (plain.scale, scaled.scale) == ((), tuple(units))
     assert np.array_equal(scaled.simplices, plain.simplices)
     assert scaled.places.tolist() == plain.places.tolist()
     words = "coordinates were divided by 0.0078125, 512, 1, and lengths and angles are of these"
@@ -307,6 +309,8 @@ def test_a_mesh_that_stays_on_its_server_is_in_own_coordinates(server, tmp_path)
     again = stellate.download(mesh.name, server=server)
     assert again.points.tobytes() == mesh.points.tobytes()
     assert str(again.report) == str(mesh.report)
+    assert again.scale == mesh.scale == tuple(SCALE)
+    assert mesh.slice(0).scale == mesh.scale
     saved = stellate.download(mesh.name, server=server, to=tmp_path / "python.txt")
     assert saved.vertices == len(mesh.points)
     program = [viewer_module.find_stellate(), "download", mesh.name, "--server", server.address]

@@ -1,4 +1,6 @@
 #include <algorithm>
+#include <charconv>
+#include <string_view>
 #include <utility>
 
 #include "oracles/combined/common.h"
@@ -8,7 +10,7 @@
 namespace stellate::oracles {
 namespace {
 
-using Eigen::Index, Eigen::VectorXd;
+using Eigen::Index, Eigen::MatrixXd, Eigen::VectorXd;
 
 std::shared_ptr<Oracle> Divided(const std::shared_ptr<Oracle>& oracle, const VectorXd& units) {
   if (std::shared_ptr<Oracle> made = oracle->DividedBy(units)) return made;
@@ -19,6 +21,48 @@ std::shared_ptr<Oracle> Divided(const std::shared_ptr<Oracle>& oracle, const Vec
       "nearest in its own coordinates, and in scaled ones another point is. Scale what it is made "
       "of, as the points of a cloud, and then the mesh's points back; or let it override "
       "DividedBy");
+}
+
+// Takes "[1, 2, 3]", as oracles write a point of R^d, from the front of a text.
+bool TakePoint(std::string_view* text, VectorXd* point) {
+  std::string_view rest = *text;
+  for (Index i = 0; i < point->size(); ++i) {
+    const std::string_view before = i == 0 ? "[" : ", ";
+    if (!rest.starts_with(before)) return false;
+    rest.remove_prefix(before.size());
+    const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), (*point)[i]);
+    if (error != std::errc()) return false;
+    rest.remove_prefix(static_cast<size_t>(end - rest.data()));
+  }
+  if (!rest.starts_with("]")) return false;
+  text->remove_prefix(text->size() - rest.size() + 1);
+  return true;
+}
+
+// What an oracle of y = x / units says, with its places in x.
+std::string InOwnCoordinates(std::string_view words, const VectorXd& units) {
+  std::string own;
+  VectorXd point(units.size());
+  while (!words.empty()) {
+    if (TakePoint(&words, &point)) {
+      for (Index i = 0; i < point.size(); ++i)
+        own += (i == 0 ? "[" : ", ") + Short(point[i] * units[i]);
+      own += "]";
+    } else {
+      own += words.front();
+      words.remove_prefix(1);
+    }
+  }
+  return own;
+}
+
+template <typename Call>
+auto Own(const VectorXd& units, const Call& call) {
+  try {
+    return call();
+  } catch (const OracleError& error) {
+    throw OracleError(error.reason(), InOwnCoordinates(error.what(), units));
+  }
 }
 
 }  // namespace
@@ -46,6 +90,35 @@ InUnits::InUnits(std::shared_ptr<Oracle> oracle, const VectorXd& scale) : own_(s
   units_ = UnitsOf(scale, own_->ambient_dimension());
   if (own_->coordinate_scale().size() > 0) Refuse("the oracle has a scale already");
   scaled_ = Divided(own_, units_);
+}
+
+Answer InUnits::ClosestPoint(const MatrixXd& y) {
+  return Own(units_, [&] { return scaled_->ClosestPoint(y); });
+}
+
+Answer InUnits::IntersectFlat(const MatrixXd& centers, const MatrixXd& bases,
+                              const VectorXd& radii) {
+  return Own(units_, [&] { return scaled_->IntersectFlat(centers, bases, radii); });
+}
+
+MatrixXd InUnits::TangentBasis(const MatrixXd& points) {
+  return Own(units_, [&] { return scaled_->TangentBasis(points); });
+}
+
+MatrixXd InUnits::EquationGradients(const MatrixXd& points) {
+  return Own(units_, [&] { return scaled_->EquationGradients(points); });
+}
+
+Answer InUnits::FacePoint(const MatrixXd& y, const Walls& face) {
+  return Own(units_, [&] { return scaled_->FacePoint(y, face); });
+}
+
+MatrixXd InUnits::Clearances(const MatrixXd& points) {
+  return Own(units_, [&] { return scaled_->Clearances(points); });
+}
+
+MatrixXd InUnits::Conormals(const MatrixXd& points, const Walls& face) {
+  return Own(units_, [&] { return scaled_->Conormals(points, face); });
 }
 
 VectorXd InUnits::LocalSize(const Eigen::MatrixXd& points) {

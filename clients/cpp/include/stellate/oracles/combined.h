@@ -83,33 +83,21 @@ class InUnits final : public Oracle {
 
   int dimension() const override { return scaled_->dimension(); }
   int ambient_dimension() const override { return scaled_->ambient_dimension(); }
-  Answer ClosestPoint(const Eigen::MatrixXd& y) override { return scaled_->ClosestPoint(y); }
+  Answer ClosestPoint(const Eigen::MatrixXd& y) override;
   bool has_intersect_flat() const override { return scaled_->has_intersect_flat(); }
   Answer IntersectFlat(const Eigen::MatrixXd& centers, const Eigen::MatrixXd& bases,
-                       const Eigen::VectorXd& radii) override {
-    return scaled_->IntersectFlat(centers, bases, radii);
-  }
+                       const Eigen::VectorXd& radii) override;
   bool has_tangent_basis() const override { return scaled_->has_tangent_basis(); }
-  Eigen::MatrixXd TangentBasis(const Eigen::MatrixXd& points) override {
-    return scaled_->TangentBasis(points);
-  }
+  Eigen::MatrixXd TangentBasis(const Eigen::MatrixXd& points) override;
   // As the oracle says at x: lengths of x / scale.
   bool has_local_size() const override { return own_->has_local_size(); }
   Eigen::VectorXd LocalSize(const Eigen::MatrixXd& points) override;
   int equations() const override { return scaled_->equations(); }
-  Eigen::MatrixXd EquationGradients(const Eigen::MatrixXd& points) override {
-    return scaled_->EquationGradients(points);
-  }
+  Eigen::MatrixXd EquationGradients(const Eigen::MatrixXd& points) override;
   int walls() const override { return scaled_->walls(); }
-  Answer FacePoint(const Eigen::MatrixXd& y, const Walls& face) override {
-    return scaled_->FacePoint(y, face);
-  }
-  Eigen::MatrixXd Clearances(const Eigen::MatrixXd& points) override {
-    return scaled_->Clearances(points);
-  }
-  Eigen::MatrixXd Conormals(const Eigen::MatrixXd& points, const Walls& face) override {
-    return scaled_->Conormals(points, face);
-  }
+  Answer FacePoint(const Eigen::MatrixXd& y, const Walls& face) override;
+  Eigen::MatrixXd Clearances(const Eigen::MatrixXd& points) override;
+  Eigen::MatrixXd Conormals(const Eigen::MatrixXd& points, const Walls& face) override;
   std::vector<std::uint8_t> labels() const override { return scaled_->labels(); }
   std::vector<Walls> closures() const override { return scaled_->closures(); }
   std::vector<std::string> region_names() const override { return own_->region_names(); }
