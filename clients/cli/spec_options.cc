@@ -3,9 +3,12 @@
 #include <CLI/CLI.hpp>
 #include <cmath>
 #include <cstdint>
+#include <string>
+#include <string_view>
 #include <type_traits>
 
 #include "mesh_settings.h"
+#include "shared/auto.h"
 
 namespace stellate::cli {
 namespace {
@@ -44,11 +47,11 @@ SpecOptions::SpecOptions(CLI::App* command, bool serves) {
           ->type_name("FLOAT|auto REQUIRED");
   // CLI11 would say only that it is required.
   command->final_callback([epsilon] {
-    if (epsilon->count() == 0)
-      throw CLI::RequiredError(
-          "--epsilon is required: the largest circumradius of a simplex, a length; or "
-          "--epsilon auto, which takes a quarter of the reach that the oracle's answers show",
-          CLI::ExitCodes::RequiredError);
+    if (epsilon->count() > 0) return;
+    std::string what = automatic::kEpsilonIs;
+    constexpr std::string_view kSlot = "{auto}";
+    what.replace(what.find(kSlot), kSlot.size(), "--epsilon auto");
+    throw CLI::RequiredError("--epsilon is required: " + what, CLI::ExitCodes::RequiredError);
   });
   for (const MeshSetting& setting : RunSettings()) Add(command, setting, &options);
   if (serves) {

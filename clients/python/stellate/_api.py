@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, Union, overload
 from ._checkpoint import Checkpoint
 from ._credentials import Credentials
 from ._download import Unfinished, fetch, fetch_to
-from ._epsilon import Epsilon
+from ._epsilon import Epsilon, what_is_missing
 from ._files.formats import check_save
 from ._findings import CheckReport
 from ._follow import Following, OnProgress
@@ -104,7 +104,7 @@ def mesh(
 @takes(MeshOptions)
 def mesh(
     oracle: Any,
-    epsilon: Epsilon,
+    epsilon: Epsilon | None = None,
     server: str | Server | Client | None = None,
     on_progress: OnProgress | None = None,
     credentials: Credentials | None = None,
@@ -122,7 +122,7 @@ def mesh(
 
     Args:
       oracle: see stellate.Oracle.
-      epsilon: the largest circumradius of a simplex, a length. The mesh lies within about
+      epsilon: required, the largest circumradius of a simplex, a length. The mesh lies within about
         epsilon^2 / (2 reach) of the manifold; 0.4 reach and below is safe. The number of vertices
         grows with epsilon^-k. "auto": a quarter of the reach that stellate.check finds, to two
         digits; where that was too coarse, twice at most, a quarter of what the certificate shows.
@@ -173,6 +173,8 @@ def mesh(
       checkpoint, and is Interrupted, a KeyboardInterrupt with the mesh so far; a second Ctrl-C does
       not wait for that.
     """
+    if epsilon is None:
+        raise TypeError(what_is_missing())
     files, streamed = _files(save), [os.fspath(file) for file in _files(to)]
     if files and streamed:
         raise TypeError("mesh() takes either save or to")
@@ -270,7 +272,7 @@ def watch(
         yield from _watch_by_name(oracle, server, on_progress)
         return
     if epsilon is None:
-        raise TypeError("watch() needs epsilon, a length or 'auto', to mesh an oracle's manifold")
+        raise TypeError(what_is_missing())
     interrupts = Interrupts()
     with Run(oracle, epsilon, server, on_progress, options, keep=keep, scale=scale) as session:
         interrupts.on_first = session.interrupt

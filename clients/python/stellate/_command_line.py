@@ -29,6 +29,7 @@ from ._command_oracle import CommandOracle
 from ._complex import Complex
 from ._credentials import Credentials
 from ._download import Unfinished
+from ._epsilon import what_epsilon_is
 from ._oracle_source import Refused, add_oracle, name_of, oracle_of, scaled_oracle_of
 from ._reconnect import WAITS
 from ._saved import SavedMesh
@@ -143,8 +144,15 @@ def _deliver(finished: Complex | SavedMesh, options: argparse.Namespace) -> int:
     return _WELL if finished.certified else _NOT_CERTIFIED
 
 
+def _insist_on_epsilon(options: argparse.Namespace) -> None:
+    """argparse would say only that it is required. Raises: Refused."""
+    if options.epsilon is None:
+        raise Refused(f"--epsilon is required: {what_epsilon_is('--epsilon auto')}")
+
+
 def _mesh(options: argparse.Namespace) -> int:
     finished: Complex | SavedMesh
+    _insist_on_epsilon(options)
     oracle, settings = oracle_of(options), _settings(options)
     if isinstance(oracle, CommandOracle):
         settings["workers"] = max(settings.get("workers", 1), oracle.processes)
@@ -174,6 +182,7 @@ def _short(label: str) -> str:
 
 
 def _declare(options: argparse.Namespace) -> int:
+    _insist_on_epsilon(options)
     oracle, settings = scaled_oracle_of(options), _settings(options)
     label = options.label or _short(name_of(options))
     with _connected(options) as client:
@@ -242,7 +251,7 @@ def _revision(text: str) -> int:
 
 def _add_settings(command: argparse.ArgumentParser, serves: bool) -> None:
     command.add_argument(
-        "-e", "--epsilon", type=_epsilon, required=True,
+        "-e", "--epsilon", type=_epsilon,
         help="largest circumradius of a simplex, a length; or auto: a quarter of the reach that "
         "the doctor finds",
     )  # fmt: skip

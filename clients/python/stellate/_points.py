@@ -19,6 +19,12 @@ _ORTHONORMAL = 1e-9  # what differs by more is made so; the server allows 1e-6
 _DEPENDENT = 1e-6  # of the longest column: what is left of one that has nothing of its own
 
 
+DIMENSION_IS_MISSING = (
+    "dimension is missing: of the manifold that the points lie on, 1 for a curve, 2 for a surface: "
+    "dimension=2"
+)
+
+
 class CheckedPoints:
     """What stellate.reconstruct was given, as the server takes it.
 
@@ -35,7 +41,7 @@ class CheckedPoints:
     def __init__(
         self,
         points: Any,
-        dimension: int,
+        dimension: int | None,
         tangents: Any,
         noise: Noise,
         reach: float | None,
@@ -47,6 +53,8 @@ class CheckedPoints:
         steiner: bool = False,
     ) -> None:
         """Raises: InvalidArgument, naming the row where it is one."""
+        if dimension is None:
+            raise TypeError(DIMENSION_IS_MISSING)
         if isinstance(dimension, bool) or not isinstance(dimension, numbers.Integral):
             raise InvalidArgument(f"dimension has to be a whole number, and is {dimension!r}")
         self.points = _array(points, "points", 2, "(n, d), a row for each point")

@@ -42,7 +42,7 @@ Path = Union[str, "os.PathLike[str]"]
 
 def reconstruct(
     points: Any,
-    dimension: int,
+    dimension: int | None = None,
     tangents: Any = None,
     noise: Noise = "auto",
     reach: float | None = None,
@@ -69,7 +69,7 @@ def reconstruct(
     Args:
       points: (n, d) finite numbers, an array, lists or a table, whose columns' names the mesh keeps. Row i is vertex i of the mesh: labels and other
         data of the points stay attached. None is moved, and none added unless by `steiner`.
-      dimension: k of the manifold, 1 to 3, below d.
+      dimension: required, k of the manifold, 1 to 3, below d.
       tangents: (n, d, k), of each point a basis of the tangent space, its columns; they need not be
         orthonormal. None: they are estimated from the points.
       noise: how far points are off the manifold: the standard deviation of each coordinate, a length;
@@ -126,7 +126,7 @@ def reconstruct(
         checked.divide(units)
     files = [save] if isinstance(save, (str, os.PathLike)) else list(save)
     for file in files:
-        check_save(file, int(dimension), checked.points.shape[1])
+        check_save(file, checked.spec.dimension, checked.points.shape[1])
     if isinstance(server, Client) and credentials is not None:
         raise InvalidArgument("a Client has its credentials already: give it them")
     with contextlib.ExitStack() as stack:

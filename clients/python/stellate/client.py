@@ -102,8 +102,10 @@ class Client:
         self._policy = ReconnectPolicy(reconnect_seconds, self._connect, self._why_hopeless)
 
     @takes(SpecOptions)
-    def create(self, oracle: Any, epsilon: Epsilon, **options: Unpack[SpecOptions]) -> MeshInfo:
-        """Declares a mesh, which waits to be served. epsilon and options: see stellate.mesh.
+    def create(
+        self, oracle: Any, epsilon: Epsilon | None = None, **options: Unpack[SpecOptions]
+    ) -> MeshInfo:
+        """Declares a mesh, which waits to be served. epsilon, required, and options: see stellate.mesh.
 
         When the server is lost it is repeated: an id of its own lets the server know the mesh again.
         """

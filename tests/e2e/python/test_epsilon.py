@@ -1,17 +1,37 @@
 """epsilon: always asked for, or found from the oracle's answers."""
 
 import io
+import subprocess
 
 import numpy as np
 import pytest
 import stellate
 from stellate import manifolds
+from stellate._command_line import main
+from stellate.viewer import find_stellate
 
 
 def test_epsilon_has_no_default(client):
     for call in (stellate.mesh, client.create, lambda oracle: next(stellate.watch(oracle))):
-        with pytest.raises(TypeError, match="epsilon"):
+        with pytest.raises(
+            TypeError, match='^epsilon is missing: .* or epsilon="auto", which takes'
+        ):
             call(manifolds.Torus())
+
+
+@pytest.mark.parametrize("command", ["mesh", "declare"])
+def test_command_lines_of_both_languages_say_alike_what_is_missing(command, capfd):
+    assert main([command, "stellate.manifolds:Torus"]) == 2
+    words = capfd.readouterr().err.splitlines()[0].removeprefix("stellate: ")
+    assert words.startswith("--epsilon is required: ") and "or --epsilon auto" in words
+    program = subprocess.run([find_stellate(), command, "torus"], capture_output=True, text=True)
+    assert program.returncode == 2 and words in " ".join(program.stderr.split())
+
+
+@pytest.mark.parametrize("make", [stellate.reconstruct, stellate.oracles.PointCloud])
+def test_dimension_has_no_default(make, rng):
+    with pytest.raises(TypeError, match="dimension is missing: .*2 for a surface: dimension=2"):
+        make(rng.normal(size=(100, 3)))
 
 
 @pytest.mark.parametrize(

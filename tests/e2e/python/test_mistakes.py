@@ -18,7 +18,6 @@ def implicit(f=lambda x: (x * x).sum(axis=1, keepdims=True) - 1, **changed):
 @pytest.mark.parametrize(
     "words, call",
     [
-        ("a length .* or 'auto', and is None", lambda: mesh(epsilon=None)),
         ("a length .* or 'auto', and is '0.1'", lambda: mesh(epsilon="0.1")),
         ("a length .* or 'auto', and is True", lambda: mesh(epsilon=True)),
         (r"a length .* or 'auto', and is \[0.1\]", lambda: mesh(epsilon=[0.1])),
@@ -42,6 +41,11 @@ def implicit(f=lambda x: (x * x).sum(axis=1, keepdims=True) - 1, **changed):
 def test_arguments(words, call):
     with pytest.raises(stellate.InvalidArgument, match=words):
         call()
+
+
+def test_none_is_no_epsilon():
+    with pytest.raises(TypeError, match='epsilon is missing: .* or epsilon="auto"'):
+        mesh(epsilon=None)
 
 
 @pytest.mark.parametrize(

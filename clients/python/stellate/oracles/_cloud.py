@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .._point_sets import as_points, column_names, tree_of
+from .._points import DIMENSION_IS_MISSING
 from .._rows import Array, Flags, apply, norms, product, transposed
 from ..errors import InvalidArgument
 from ._bandwidth import Fits, by_density, insist_on_flatness, noise_aware
@@ -25,7 +26,7 @@ class PointCloud(Projection):
 
     Args:
       points: (n, d). They have to lie on all of the manifold, at distances well below its reach.
-      dimension: k.
+      dimension: required, k.
       bandwidth: how far points are neighbours of a place. By default each point has one of its own:
         twice the distance within which it and those about it have 2 k + 3 others, or what it takes
         for noise to add no more than a tenth to the curvature. Smoother when larger; sheets have to
@@ -43,9 +44,13 @@ class PointCloud(Projection):
 
     thread_safe = True
 
-    def __init__(self, points: Any, dimension: int, *, bandwidth: float | None = None) -> None:
+    def __init__(
+        self, points: Any, dimension: int | None = None, *, bandwidth: float | None = None
+    ) -> None:
         self._points, self.coordinate_names = as_points(points, "points"), column_names(points)
         n, d = self._points.shape
+        if dimension is None:
+            raise TypeError(DIMENSION_IS_MISSING)
         if not isinstance(dimension, int) or not 1 <= dimension < d:
             raise InvalidArgument(
                 f"dimension has to be a whole number from 1 to {d - 1}: {dimension!r}"
