@@ -39,8 +39,8 @@ constexpr const char* kWhat =
     "  mpirun -n 64 stellate-mpi mesh torus -e 0.01 -o torus.vtu\n\n"
     "Each rank starts an oracle of its own. The questions of each round are shared out among all, "
     "and so is most of the computing. Every rank holds the whole mesh: more ranks make a mesh "
-    "sooner, and none larger. The first writes the files, and the mesh is the same for any number "
-    "of ranks. docs/using/large.md";
+    "sooner, and none larger. The first writes the files, but pieces of .pvtu, and the mesh is the "
+    "same for any number of ranks. docs/using/large.md";
 
 // `stellate-mpi mesh`.
 class PartCommand {
@@ -50,7 +50,10 @@ class PartCommand {
             "mesh", "Mesh a manifold of the catalogue, a solid, or the manifold of a command")),
         source_(command_),
         spec_(command_, /*serves=*/true) {
-    outputs_.AddTo(command_);
+    CLI::Option* const output = outputs_.AddTo(command_);
+    output->description(output->get_description() +
+                        ". name.pvtu: for ParaView, a piece a rank, which each writes itself, in "
+                        "a folder `name` beside it");
     report_.AddTo(command_);
     command_->footer(
         "Exit status, of all ranks: 0 certified, 1 not certified, 2 usage or refused, 3 an oracle "

@@ -9,7 +9,9 @@
 
 #include "core/base/parcel.h"
 #include "core/mesher.h"
+#include "mesh/piece.h"
 #include "mpi_peers.h"
+#include "pieces.h"
 #include "result.h"
 #include "run/scaled.h"
 #include "server/convert/error_map.h"
@@ -28,32 +30,6 @@ using Clock = std::chrono::steady_clock;
 
 // As many as ids go; the ranks are the user's own.
 constexpr std::uint64_t kMostVertices = 2'000'000'000;
-
-// Has all parts go on, or none: the first part's error that has one.
-Expected<void> Agree(const core::Peers& peers, const Expected<void>& own) {
-  Bytes message;
-  if (!own) {
-    core::Pack(own.error().code, &message);
-    for (const std::string* words : {&own.error().reason, &own.error().message}) {
-      core::Pack(words->size(), &message);
-      core::Pack(std::span<const char>(*words), &message);
-    }
-  }
-  const std::vector<Bytes> all = peers.ToAll(std::move(message));
-  const auto failed =
-      std::find_if(all.begin(), all.end(), [](const Bytes& its) { return !its.empty(); });
-  if (failed == all.end()) return {};
-  core::Parcel parcel(*failed);
-  Error error;
-  error.code = parcel.Unpack<ErrorCode>();
-  for (std::string* words : {&error.reason, &error.message}) {
-    words->resize(parcel.Unpack<std::size_t>());
-    parcel.Unpack(words->size(), words->data());
-  }
-  if (failed != all.begin())
-    error.message = "rank " + std::to_string(failed - all.begin()) + ": " + error.message;
-  return tl::unexpected(std::move(error));
-}
 
 Expected<v1::MeshSpec> Declare(Oracle& oracle, const MeshOptions& options) {
   if (!options.epsilon.length())
@@ -201,11 +177,19 @@ class PartRun {
   std::exception_ptr thrown_;  // by on_progress
 };
 
+// Of those that the part is to write: pieces are every part's, other files the first's.
 Expected<void> CheckPaths(const Oracle& oracle, const std::vector<std::string>& paths,
-                          const MeshOptions& options) {
+                          const MeshOptions& options, int part) {
   const int k = oracle.dimension() - (options.boundary_only.value_or(false) ? 1 : 0);
-  for (const std::string& path : paths)
-    if (auto ok = CheckSave(path, k, oracle.ambient_dimension()); !ok) return ok;
+  const int d = oracle.ambient_dimension();
+  for (const std::string& path : paths) {
+    Expected<void> ok;
+    if (client::PiecePaths::AreMeantBy(path))
+      ok = client::PiecePaths(path).Check(k, d, static_cast<std::size_t>(part));
+    else if (part == 0)
+      ok = CheckSave(path, k, d);
+    if (!ok) return ok;
+  }
   return {};
 }
 
@@ -230,7 +214,7 @@ Expected<Result> Run(const Expected<std::shared_ptr<Oracle>>& made,
   const auto has_oracle = made ? Expected<void>() : tl::unexpected(made.error());
   if (auto agreed = Agree(peers, has_oracle); !agreed) return tl::unexpected(agreed.error());
   Oracle& oracle = **made;
-  const auto writable = is_first ? CheckPaths(oracle, paths, options) : Expected<void>();
+  const auto writable = CheckPaths(oracle, paths, options, peers.part());
   if (auto agreed = Agree(peers, writable); !agreed) return tl::unexpected(agreed.error());
   Expected<server::MeshRequest> request = Settle(oracle, options, peers);
   if (!request) return tl::unexpected(request.error());
@@ -239,15 +223,38 @@ Expected<Result> Run(const Expected<std::shared_ptr<Oracle>>& made,
       .Go();
 }
 
+// The errors, the same in all parts, of those indices whose pieces could not be written.
+Expected<std::vector<Error>> SaveAllPieces(const Result& result,
+                                           const std::vector<std::string>& indices,
+                                           const core::Peers& peers) {
+  std::vector<Error> failures;
+  if (indices.empty()) return failures;
+  const Expected<Mesh> mesh = WholeOf(result);
+  const auto own = mesh ? Expected<void>() : tl::unexpected(mesh.error());
+  if (auto agreed = Agree(peers, own); !agreed) return tl::unexpected(agreed.error());
+  for (const std::string& index : indices)
+    if (const auto saved = SavePieces(*mesh, index, peers); !saved)
+      failures.push_back(saved.error());
+  return failures;
+}
+
 Expected<SavedMesh> RunTo(const Expected<std::shared_ptr<Oracle>>& made,
                           const std::vector<std::string>& paths, const MeshOptions& options,
                           MPI_Comm comm) {
   const MpiPeers peers(comm);
-  Expected<Result> result = Run(made, paths, options, Keep::kInFirst, peers, comm);
+  std::vector<std::string> indices, files;
+  for (const std::string& path : paths)
+    (client::PiecePaths::AreMeantBy(path) ? indices : files).push_back(path);
+  const Keep keep = indices.empty() ? Keep::kInFirst : Keep::kInAll;
+  const Expected<Result> result = Run(made, paths, options, keep, peers, comm);
   if (!result) return tl::unexpected(result.error());
-  const bool is_first = peers.part() == 0;
-  Expected<SavedMesh> saved = is_first ? Save(std::move(*result), paths) : Unsaved(*result);
-  const Expected<void> own = saved ? Expected<void>() : tl::unexpected(saved.error());
+  const Expected<std::vector<Error>> unwritten = SaveAllPieces(*result, indices, peers);
+  if (!unwritten) return tl::unexpected(unwritten.error());
+  SavedMesh saved = Unsaved(*result);
+  saved.failures = peers.part() == 0 ? Save(*result, files) : std::vector<Error>();
+  saved.failures.insert(saved.failures.end(), unwritten->begin(), unwritten->end());
+  const bool is_lost = !paths.empty() && saved.failures.size() == paths.size();
+  const auto own = is_lost ? tl::unexpected(saved.failures.front()) : Expected<void>();
   if (auto agreed = Agree(peers, own); !agreed) return tl::unexpected(agreed.error());
   return saved;
 }

@@ -119,23 +119,18 @@ SavedMesh Unsaved(const Result& result) {
           {}};
 }
 
-Expected<SavedMesh> Save(Result result, const std::vector<std::string>& paths) {
-  SavedMesh saved = Unsaved(result);
-  if (paths.empty()) return saved;
+std::vector<Error> Save(const Result& result, const std::vector<std::string>& paths) {
+  if (paths.empty()) return {};
   auto failures = WriteAsItComes(result, paths);
-  if (!failures) return tl::unexpected(failures.error());
-  if (*failures) {
-    saved.failures = std::move(**failures);
-  } else {
-    const Expected<Mesh> mesh = WholeOf(result);
-    if (!mesh) return tl::unexpected(mesh.error());
-    for (const std::string& path : paths)
-      if (const Expected<void> written = mesh->Save(path); !written)
-        saved.failures.push_back(written.error());
-  }
-  if (saved.failures.size() == paths.size())
-    return tl::unexpected(std::move(saved.failures.front()));
-  return saved;
+  if (!failures) return {paths.size(), failures.error()};
+  if (*failures) return std::move(**failures);
+  const Expected<Mesh> mesh = WholeOf(result);
+  if (!mesh) return {paths.size(), mesh.error()};
+  std::vector<Error> unwritten;
+  for (const std::string& path : paths)
+    if (const Expected<void> written = mesh->Save(path); !written)
+      unwritten.push_back(written.error());
+  return unwritten;
 }
 
 }  // namespace stellate::mpi

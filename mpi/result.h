@@ -29,7 +29,7 @@ Expected<Mesh> WholeOf(const Result& result);
 
 // What is said of a mesh that is in no file.
 SavedMesh Unsaved(const Result& result);
-// Writes it to files, as DownloadMeshTo does.
-Expected<SavedMesh> Save(Result result, const std::vector<std::string>& paths);
+// Writes it to files, as DownloadMeshTo does. Returns an error for each that could not be written.
+std::vector<Error> Save(const Result& result, const std::vector<std::string>& paths);
 
 }  // namespace stellate::mpi

@@ -2,43 +2,10 @@
 
 from __future__ import annotations
 
-import subprocess
 from pathlib import Path
 
 import pytest
-from jobs import ROOT, job, ranks, run
-
-# An oracle command that does something else in rank 1, once it has said some bytes.
-IN_RANK_1 = """#!/bin/sh
-RANK=$PPID  # or that of a shell of its own
-grep -q stellate-mpi /proc/$RANK/comm || RANK=$(cut -d " " -f 4 /proc/$RANK/stat)
-SCRIPT=$$
-export RANK SCRIPT
-perl {root}/clients/pipe/torus.pl | if [ "$OMPI_COMM_WORLD_RANK" = 1 ]; then
-  perl -e 'while (sysread STDIN, $said, 4096) {{
-    syswrite STDOUT, $said;
-    $bytes += length $said;
-    if ($bytes > {bytes}) {{ {what} }}
-  }}'
-else
-  cat
-fi
-"""
-
-
-def oracle(folder: Path, count: int, what: str) -> str:
-    script = folder / "oracle"
-    script.write_text(IN_RANK_1.format(root=ROOT, bytes=count, what=what))
-    script.chmod(0o755)
-    return str(script)
-
-
-def refused(done: subprocess.CompletedProcess[str], status: int, *words: str) -> None:
-    assert done.returncode == status, (done.stdout, done.stderr)
-    ours = [line for line in done.stderr.splitlines() if line.startswith("stellate: ")]
-    assert len(ours) == 1, done.stderr
-    for word in words:
-        assert word in ours[0]
+from jobs import job, oracle, ranks, refused, run
 
 
 @pytest.mark.parametrize(

@@ -38,6 +38,7 @@ struct FileShape {
   Report report = {};  // of a mesh that is over
   std::optional<PointWalls> walls = {};
   bool has_labels = false;  // its cells; also those of a boundary alone
+  std::optional<std::vector<std::int64_t>> point_ids = {};  // of a piece: the mesh's own
 
   std::uint64_t simplices() const;
 };
@@ -78,6 +79,13 @@ std::unique_ptr<MeshWriter> MakePlyWriter(Draft draft, const FileShape& shape);
 // is one, with nothing to say.
 std::unique_ptr<MeshWriter> MakeVtuWriter(Draft draft, FileShape shape,
                                           const std::vector<Group>* groups = nullptr);
+
+// One of several such files that are one mesh together; `shape` has point_ids. It is whole, but not
+// yet in its place: Finish puts it there.
+Expected<Draft> WriteVtuPiece(Draft draft, FileShape shape, const Eigen::MatrixXd& points,
+                              const std::vector<Group>& groups);
+// The contents of the .pvtu file that names them, by paths relative to it. `shape`: of any of them.
+std::string VtuIndex(const FileShape& shape, const std::vector<std::string>& sources);
 
 // Whole files, binary, little endian. kFileFailed for a mesh that is too fine for single precision,
 // which .stl and .glb have, and of the latter two for one without triangles.

@@ -58,6 +58,8 @@ constexpr FileFormat kFormats[] = {
     {".npz", 0, kAny, kAny, "anything", Holds::kRows, nullptr, false, client::Npz},
 };
 
+constexpr const char* kPieces = "; .pvtu is written by stellate-mpi, a piece a rank";
+
 bool CanHold(const FileFormat& format, int k, int d) {
   if (format.surface_of_solids && k == 3 && d == 3) return true;
   return format.least_dimension <= k && k <= format.largest_dimension &&
@@ -81,7 +83,8 @@ Expected<const FileFormat*> Choose(const std::string& path, int k, int d) {
                                           [&](const FileFormat& f) { return ending == f.ending; });
   if (format == std::end(kFormats)) {
     return Fail(ErrorCode::kFileFailed, "no format is known by the ending '" + ending + "' of " +
-                                            path + "; known for this mesh:" + able);
+                                            path + "; known for this mesh:" + able +
+                                            (ending == ".pvtu" ? kPieces : ""));
   }
   if (CanHold(*format, k, d)) return format;
   const bool high = k >= format->least_dimension && k <= format->largest_dimension;

@@ -7,6 +7,7 @@
 
 #include "mesh/formats.h"
 #include "mesh/parts.h"
+#include "mesh/xml.h"
 #include "mesh/zip.h"
 #include "stellate/version.h"
 
@@ -31,22 +32,6 @@ constexpr std::string_view kModel =
 <metadata name="Application">stellate )" STELLATE_VERSION R"(</metadata>
 <resources>
 )";
-
-std::string Escaped(const std::string& name) {
-  std::string text;
-  for (const char c : name) {
-    if (c == '&') {
-      text += "&amp;";
-    } else if (c == '<') {
-      text += "&lt;";
-    } else if (c == '>') {
-      text += "&gt;";
-    } else {
-      text += c;
-    }
-  }
-  return text;  // RegionName leaves no quote
-}
 
 // An element whose attributes have these names, one character or two, and the column's values.
 template <typename Column>
@@ -79,7 +64,7 @@ Expected<std::string> ThreeMf(const Mesh& mesh) {
     // "model": what is closed, and can be printed; "surface": what is not.
     const std::string type = part.is_closed ? "model" : "surface";
     xml.append("<object id=\"").append(id).append("\" type=\"").append(type);
-    xml.append("\" name=\"").append(Escaped(part.name)).append("\"><mesh><vertices>\n");
+    xml.append("\" name=\"").append(EscapedXml(part.name)).append("\"><mesh><vertices>\n");
     for (const auto& point : part.points.colwise())
       AddElement(&xml, "<vertex", {" x=\"", "\" y=\"", "\" z=\""}, point);
     xml += "</vertices><triangles>\n";

@@ -10,6 +10,7 @@
 
 #include "mesh/formats.h"
 #include "mesh/groups.h"
+#include "mesh/xml.h"
 #include "stellate/version.h"
 
 namespace stellate::client {
@@ -72,6 +73,7 @@ enum ArrayName {
   kPoints,
   kCoordinates,
   kPointWalls,
+  kPointIds,
   kConnectivity,
   kOffsets,
   kCellWalls,
@@ -81,6 +83,8 @@ enum ArrayName {
   kTypes,
   kArrays
 };
+
+constexpr const char* kGlobalIds = "GlobalPointIds";  // as VTK's own filters call them
 
 struct Appended {
   const char *type, *name;
@@ -94,30 +98,73 @@ struct Appended {
   std::uint64_t bytes() const { return row_bytes * rows; }
 };
 
+using Arrays = std::array<Appended, kArrays>;
+
+Arrays ArraysOf(const FileShape& shape) {
+  const std::uint64_t n = shape.vertices, m = shape.simplices();
+  const auto d = static_cast<std::uint64_t>(shape.ambient_dimension);
+  const bool has_walls = shape.walls.has_value(), has_labels = shape.has_labels;
+  const bool has_groups = shape.groups.size() > 1 || has_labels;
+  std::uint64_t ids = 0;
+  for (const FileShape::Cells& cells : shape.groups)
+    ids += cells.count * (static_cast<std::uint64_t>(cells.dimension) + 1);
+  return {{
+      {"Float64", "Points", 3, 24, n},
+      {"Float64", "coordinates", shape.ambient_dimension, 8 * d, n, d > 3},
+      {"UInt64", "walls", 1, 8, n, has_walls},
+      {"Int64", kGlobalIds, 1, 8, n, shape.point_ids.has_value()},
+      {"Int64", "connectivity", 1, 8, ids},
+      {"Int64", "offsets", 1, 8, m},
+      {"UInt64", "walls", 1, 8, m, has_groups},
+      {"Int32", "group", 1, 4, m, has_groups},
+      {"Int32", "region", 1, 4, m, has_labels},
+      {"Int32", "sides", 2, 8, m, has_labels},
+      {"UInt8", "types", 1, 1, m},
+  }};
+}
+
+// An element with one for each of the arrays that are there; empty where none is. `prefix`: of the
+// names of all, "P" in an index, which says no more of an array; else with its offset.
+std::string Section(const Arrays& arrays, const std::string& prefix, const std::string& name,
+                    const std::vector<ArrayName>& those) {
+  std::string xml;
+  bool has_ids = false;
+  for (const ArrayName which : those) {
+    const Appended& array = arrays[which];
+    if (!array.is_there) continue;
+    has_ids |= which == kPointIds;
+    xml += "<" + prefix + "DataArray type=\"" + array.type + "\"" +
+           (which == kPointIds ? " IdType=\"1\"" : "") + " Name=\"" + array.name +
+           "\" NumberOfComponents=\"" + std::to_string(array.components) + "\"";
+    std::uint64_t offset = 0;
+    for (std::size_t i = 0; i < which; ++i)
+      if (arrays[i].is_there) offset += sizeof(std::uint64_t) + arrays[i].bytes();
+    if (prefix.empty()) xml += " format=\"appended\" offset=\"" + std::to_string(offset) + "\"";
+    xml += "/>\n";
+  }
+  if (xml.empty()) return xml;
+  const std::string ids = has_ids ? std::string(" GlobalIds=\"") + kGlobalIds + "\"" : "";
+  const std::string element = prefix + name;
+  return "<" + element + ids + ">\n" + xml + "</" + element + ">\n";
+}
+
+// The data of points and cells, as a file and an index of files say it alike.
+std::string DataSections(const Arrays& arrays, const std::string& prefix) {
+  return Section(arrays, prefix, "PointData", {kCoordinates, kPointWalls, kPointIds}) +
+         Section(arrays, prefix, "CellData", {kGroup, kCellWalls, kRegion, kSides});
+}
+
+constexpr const char* kFileHead =
+    "\" version=\"1.0\" byte_order=\"LittleEndian\" header_type=\"UInt64\">\n";
+
 class VtuWriter final : public MeshWriter {
  public:
   VtuWriter(Draft draft, FileShape shape, const std::vector<Group>* groups)
-      : draft_(std::move(draft)), shape_(std::move(shape)), groups_(groups) {
-    const std::uint64_t n = shape_.vertices, m = shape_.simplices();
-    const auto d = static_cast<std::uint64_t>(shape_.ambient_dimension);
-    const bool has_walls = shape_.walls.has_value(), has_labels = shape_.has_labels;
-    const bool has_groups = shape_.groups.size() > 1 || has_labels;
-    std::uint64_t ids = 0;
-    for (const FileShape::Cells& cells : shape_.groups)
-      ids += cells.count * (static_cast<std::uint64_t>(cells.dimension) + 1);
-    arrays_ = {{
-        {"Float64", "Points", 3, 24, n},
-        {"Float64", "coordinates", shape_.ambient_dimension, 8 * d, n, d > 3},
-        {"UInt64", "walls", 1, 8, n, has_walls},
-        {"Int64", "connectivity", 1, 8, ids},
-        {"Int64", "offsets", 1, 8, m},
-        {"UInt64", "walls", 1, 8, m, has_groups},
-        {"Int32", "group", 1, 4, m, has_groups},
-        {"Int32", "region", 1, 4, m, has_labels},
-        {"Int32", "sides", 2, 8, m, has_labels},
-        {"UInt8", "types", 1, 1, m},
-    }};
-    head_ = Head();
+      : draft_(std::move(draft)),
+        shape_(std::move(shape)),
+        groups_(groups),
+        arrays_(ArraysOf(shape_)),
+        head_(Head()) {
     std::uint64_t place = head_.size();
     for (Appended& array : arrays_) {
       if (!array.is_there) continue;
@@ -137,7 +184,7 @@ class VtuWriter final : public MeshWriter {
 
   Expected<void> AddCells(std::size_t /*group*/,
                           const Eigen::Ref<const SimplexMatrix>& cells) override {
-    if (auto ok = AddWalls(); !ok) return ok;
+    if (auto ok = AddPointData(); !ok) return ok;
     constexpr auto kCols = static_cast<Eigen::Index>(kBlockRows);
     for (Eigen::Index first = 0; first < cells.cols(); first += kCols) {
       const Eigen::Matrix<std::int64_t, Eigen::Dynamic, Eigen::Dynamic> ids =
@@ -148,8 +195,21 @@ class VtuWriter final : public MeshWriter {
   }
 
   Expected<void> Finish() override {
-    if (auto ok = AddWalls(); !ok) return ok;
-    for (const ArrayName name : {kPoints, kCoordinates, kPointWalls, kConnectivity}) {
+    const auto ok = Complete();
+    return ok ? draft_.Finish() : ok;
+  }
+
+  // All that it does but take its place.
+  Expected<Draft> TakeWhole() {
+    if (auto ok = Complete(); !ok) return tl::unexpected(ok.error());
+    if (auto ok = draft_.Keep(); !ok) return tl::unexpected(ok.error());
+    return std::move(draft_);
+  }
+
+ private:
+  Expected<void> Complete() {
+    if (auto ok = AddPointData(); !ok) return ok;
+    for (const ArrayName name : {kPoints, kCoordinates, kPointWalls, kPointIds, kConnectivity}) {
       if (auto ok = Begin(name); !ok) return ok;  // where there is nothing
     }
     std::int64_t last = 0;
@@ -183,38 +243,21 @@ class VtuWriter final : public MeshWriter {
       });
     }
     if (ok) ok = draft_.WriteAt(end_, "\n</AppendedData>\n</VTKFile>\n");
-    return ok ? draft_.Finish() : ok;
+    return ok;
   }
 
- private:
   // Up to the first array's byte count, which begins at a multiple of 8.
   std::string Head() const {
-    std::string xml =
-        "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" "
-        "byte_order=\"LittleEndian\" header_type=\"UInt64\">\n<UnstructuredGrid>\n" +
-        FieldData(shape_) + "<Piece NumberOfPoints=\"" + std::to_string(shape_.vertices) +
-        "\" NumberOfCells=\"" + std::to_string(shape_.simplices()) + "\">\n" +
-        Section("Points", {kPoints}) + Section("Cells", {kConnectivity, kOffsets, kTypes}) +
-        Section("PointData", {kCoordinates, kPointWalls}) +
-        Section("CellData", {kGroup, kCellWalls, kRegion, kSides}) +
-        "</Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n";
+    std::string xml = std::string("<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid") +
+                      kFileHead + "<UnstructuredGrid>\n" + FieldData(shape_) +
+                      "<Piece NumberOfPoints=\"" + std::to_string(shape_.vertices) +
+                      "\" NumberOfCells=\"" + std::to_string(shape_.simplices()) + "\">\n" +
+                      Section(arrays_, "", "Points", {kPoints}) +
+                      Section(arrays_, "", "Cells", {kConnectivity, kOffsets, kTypes}) +
+                      DataSections(arrays_, "") +
+                      "</Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n";
     while (xml.size() % 8 != 7) xml += ' ';
     return xml + "_";
-  }
-
-  std::string Section(const std::string& name, const std::vector<ArrayName>& arrays) const {
-    std::string xml;
-    for (const ArrayName which : arrays) {
-      const Appended& array = arrays_[which];
-      if (!array.is_there) continue;
-      std::uint64_t offset = 0;
-      for (std::size_t i = 0; i < which; ++i)
-        if (arrays_[i].is_there) offset += sizeof(std::uint64_t) + arrays_[i].bytes();
-      xml += std::string("<DataArray type=\"") + array.type + "\" Name=\"" + array.name +
-             "\" NumberOfComponents=\"" + std::to_string(array.components) +
-             "\" format=\"appended\" offset=\"" + std::to_string(offset) + "\"/>\n";
-    }
-    return xml.empty() ? xml : "<" + name + ">\n" + xml + "</" + name + ">\n";
   }
 
   // Writes the byte count before an array, and what comes before the first one.
@@ -237,6 +280,13 @@ class VtuWriter final : public MeshWriter {
     const std::uint64_t place = array.place + sizeof(std::uint64_t) + array.written;
     array.written += bytes.size();
     return draft_.WriteAt(place, bytes);
+  }
+
+  Expected<void> AddPointData() {
+    if (auto ok = AddWalls(); !ok) return ok;
+    const Appended& ids = arrays_[kPointIds];
+    if (!ids.is_there || ids.is_begun) return {};
+    return Append(kPointIds, shape_.point_ids->data(), std::ssize(*shape_.point_ids));
   }
 
   Expected<void> AddWalls() {
@@ -279,7 +329,7 @@ class VtuWriter final : public MeshWriter {
   Draft draft_;
   FileShape shape_;
   const std::vector<Group>* groups_;
-  std::array<Appended, kArrays> arrays_;
+  Arrays arrays_;
   std::string head_;  // until it is written
   std::uint64_t end_ = 0;
 };
@@ -289,6 +339,25 @@ class VtuWriter final : public MeshWriter {
 std::unique_ptr<MeshWriter> MakeVtuWriter(Draft draft, FileShape shape,
                                           const std::vector<Group>* groups) {
   return std::make_unique<VtuWriter>(std::move(draft), std::move(shape), groups);
+}
+
+Expected<Draft> WriteVtuPiece(Draft draft, FileShape shape, const Eigen::MatrixXd& points,
+                              const std::vector<Group>& groups) {
+  VtuWriter writer(std::move(draft), std::move(shape), &groups);
+  if (auto ok = writer.AddPoints(points); !ok) return tl::unexpected(ok.error());
+  for (std::size_t i = 0; i < groups.size(); ++i)
+    if (auto ok = writer.AddCells(i, groups[i].simplices); !ok) return tl::unexpected(ok.error());
+  return writer.TakeWhole();
+}
+
+std::string VtuIndex(const FileShape& shape, const std::vector<std::string>& sources) {
+  const Arrays arrays = ArraysOf(shape);
+  std::string xml = std::string("<?xml version=\"1.0\"?>\n<VTKFile type=\"PUnstructuredGrid") +
+                    kFileHead + "<PUnstructuredGrid GhostLevel=\"0\">\n" + FieldData(shape) +
+                    Section(arrays, "P", "Points", {kPoints}) + DataSections(arrays, "P");
+  for (const std::string& source : sources)
+    xml += "<Piece Source=\"" + EscapedXml(source) + "\"/>\n";
+  return xml + "</PUnstructuredGrid>\n</VTKFile>\n";
 }
 
 }  // namespace stellate::client

@@ -82,8 +82,13 @@ Expected<void> Draft::WriteAt(std::uint64_t place, std::string_view bytes) {
   return {};
 }
 
-Expected<void> Draft::Finish() {
+Expected<void> Draft::Keep() {
   if (!draft_.empty() && fsync(file_) != 0) return CannotWrite(path_, errno);
+  return {};
+}
+
+Expected<void> Draft::Finish() {
+  if (auto ok = Keep(); !ok) return ok;
   if (close(std::exchange(file_, -1)) != 0) return CannotWrite(path_, errno);
   if (draft_.empty()) return {};
   if (rename(draft_.c_str(), target_.c_str()) != 0) return CannotWrite(path_, errno);

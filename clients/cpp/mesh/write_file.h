@@ -28,6 +28,8 @@ class Draft {
   Expected<void> Write(std::string_view bytes) { return WriteAt(end_, bytes); }  // at the end
   // Beyond the end leaves zeros between.
   Expected<void> WriteAt(std::uint64_t place, std::string_view bytes);
+  // Sees that what was written is on the disk. Finish does, too.
+  Expected<void> Keep();
   Expected<void> Finish();
 
  private:

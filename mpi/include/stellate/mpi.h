@@ -36,7 +36,10 @@ namespace stellate {
 Expected<Mesh> MeshInParts(Oracle& oracle, const MeshOptions& options, MPI_Comm comm);
 
 // The same into files, which the first rank writes, as MeshManifoldTo does. The others hold no
-// geometry but what they mesh with.
+// geometry but what they mesh with, unless there are pieces to write: of name.pvtu (k <= 3) each
+// rank writes name/name_RANK.vtu, in one folder that all of them see, and the first the index. A
+// piece has the simplices whose lowest vertex is in the rank's box of space, and their points, with
+// the mesh's number of each as global ids. All of these files are written or none.
 Expected<SavedMesh> MeshInPartsTo(Oracle& oracle, const std::vector<std::string>& paths,
                                   const MeshOptions& options, MPI_Comm comm);
 

@@ -176,6 +176,7 @@ def test_off_of_any_dimension(tmp_path):
         (shapes.polygon(5), "m.stl", "surfaces"),
         (shapes.polygon(5), "m.su2", "solids"),
         (shapes.torus(), "m.wkt", "no format"),
+        (shapes.torus(), "m.pvtu", "known for this mesh: .*; .pvtu is written by stellate-mpi"),
         (shapes.torus(), "m.docx", r"\.docx.*known for this mesh: .*\.vtu"),
         (shapes.torus(), "m", "no format"),
     ],

@@ -263,8 +263,9 @@ def _choose(path: str, k: int, d: int) -> _Format:
     known = " ".join(name for name, form in _FORMATS.items() if form.takes(k, d))
     form = _FORMATS.get(ending)
     if form is None:
+        pieces = "; .pvtu is written by stellate-mpi, a piece a rank" if ending == ".pvtu" else ""
         raise SaveError(
-            f"no format is known by the ending {ending!r} of {path}; known for this mesh: {known}"
+            f"no format is known by the ending {ending!r} of {path}; known for this mesh: {known}{pieces}"
         )
     if not form.takes(k, d):
         fits = form.least_dimension <= k <= form.largest_dimension
