@@ -14,7 +14,8 @@ from . import _betti, _convert, _curvature, _faces, _html, _locate, _measures, _
 from ._curvature import Curvature
 from ._faces import Face
 from ._files import formats
-from ._files.orientation import orient, turn_outwards, turn_positive
+from ._files.orientation import exchanged, oriented
+from ._files.read_txt import read_txt
 from ._locate import Located
 from ._measures import Minkowski
 from ._wire.orientation import Orientation
@@ -153,25 +154,12 @@ class Mesh:
         if self.orientation is not None:
             if not self.orientation.orientable:
                 return None
-            told = self.simplices.copy()
-            rows = np.flatnonzero(self.orientation.flags(len(told)))
-            told[rows, -2:] = told[rows][:, [-1, -2]]
-            return told
+            rows = np.flatnonzero(self.orientation.flags(len(self.simplices)))
+            return exchanged(self.simplices, rows)
         sides = self.labels
         if sides is not None and self.is_boundary and self.dimension == self.ambient_dimension - 1:
-            outwards = self.simplices.copy()
-            rows = np.flatnonzero(sides[:, 0] < sides[:, 1])
-            outwards[rows, -2:] = outwards[rows][:, [-1, -2]]
-            return outwards
-        turned = orient(self.simplices)
-        if turned is None:
-            return None
-        oriented, component = turned
-        if self.dimension == self.ambient_dimension - 1:
-            turn_outwards(self.points, oriented, component)
-        elif self.dimension == self.ambient_dimension:
-            turn_positive(self.points, oriented)
-        return oriented
+            return exchanged(self.simplices, np.flatnonzero(sides[:, 0] < sides[:, 1]))
+        return oriented(self.points, self.simplices)
 
     # What is measured. Vertices lie on M: volumes are right to O(epsilon^2).
 
@@ -501,38 +489,11 @@ def with_report(mesh: Mesh, report: Report | None) -> Mesh:
     """A FinishedMesh, or the mesh itself where there is no report."""
     if report is None:
         return mesh
-    return FinishedMesh(
-        mesh.points,
-        mesh.simplices,
-        report,
-        mesh.progress,
-        mesh.revision,
-        mesh.walls,
-        mesh.orientation,
-        mesh.labels,
-        mesh.places,
-        mesh.smoothed,
-        mesh.region_names,
-        mesh.name,
-        mesh.coordinate_names,
-        mesh.scale,
-    )
+    values: dict[str, Any] = {it.name: getattr(mesh, it.name) for it in dataclasses.fields(mesh)}
+    values["report"] = report
+    return FinishedMesh(**values)
 
 
 def load_txt(path: str | os.PathLike[str]) -> Mesh:
     """Reads the .txt format back, to the last bit. Raises ValueError if it is something else."""
-    name = os.fspath(path)
-    with open(path, errors="replace") as file:
-        try:
-            k, d, vertex_count, simplex_count = map(int, file.readline().split())
-        except ValueError:
-            raise ValueError(f"{name}: the first line has to be 'k d nv ns'") from None
-        body = file.read().split()
-    if len(body) != vertex_count * d + simplex_count * (k + 1):
-        raise ValueError(f"{name}: {len(body)} numbers do not fit its first line")
-    try:
-        points = np.array(body[: vertex_count * d], dtype=float)
-        simplices = np.array(body[vertex_count * d :], dtype=np.int64)
-    except ValueError as error:
-        raise ValueError(f"{name}: {error}") from None
-    return Mesh(points.reshape(vertex_count, d), simplices.reshape(simplex_count, k + 1))
+    return Mesh(*read_txt(os.fspath(path)))

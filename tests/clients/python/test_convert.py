@@ -15,6 +15,7 @@ import stellate
 import stellate.meshio_plugin
 import topology
 from stellate._generated import mesh_pb2
+from stellate._mesh import with_report
 
 
 @pytest.mark.parametrize("mesh", [shapes.polygon(7, 5), shapes.torus(), shapes.simplex_boundary(3)])
@@ -169,6 +170,14 @@ def test_a_frame_has_the_names_of_coordinates():
     for wrong in (["a", "b"], "abc"):
         with pytest.raises(stellate.InvalidArgument, match="names have to be 3"):
             torus.to_pandas(wrong)
+
+
+def test_a_report_leaves_all_else_of_a_mesh_as_it_is():
+    values = {field.name: object() for field in dataclasses.fields(stellate.Mesh)}
+    finished = with_report(stellate.Mesh(**values), report := object())
+    assert isinstance(finished, stellate.FinishedMesh)
+    given = {field.name: getattr(finished, field.name) for field in dataclasses.fields(finished)}
+    assert given == {**values, "report": report}
 
 
 def test_meshio_meshes_have_all_coordinates():

@@ -5,6 +5,30 @@ from __future__ import annotations
 import numpy as np
 
 
+def exchanged(simplices: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """A copy, with the last two vertices exchanged in these rows."""
+    turned = simplices.copy()
+    turned[rows, -2:] = simplices[rows][:, [-1, -2]]
+    return turned
+
+
+def oriented(points: np.ndarray, simplices: np.ndarray) -> np.ndarray | None:
+    """Simplices that agree, as orient has them; None if not orientable.
+
+    The normals of a hypersurface point outwards, and simplices that fill space have positive volumes.
+    """
+    turned = orient(simplices)
+    if turned is None:
+        return None
+    agreeing, component = turned
+    k, d = simplices.shape[1] - 1, points.shape[1]
+    if k == d - 1:
+        turn_outwards(points, agreeing, component)
+    elif k == d:
+        turn_positive(points, agreeing)
+    return agreeing
+
+
 def orient(simplices: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     """The same simplices, some with their last two vertices exchanged, so that all agree.
 
@@ -29,10 +53,8 @@ def orient(simplices: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     stays, turned = label[0::2], label[1::2]
     if (stays == turned).any():
         return None
-    oriented = simplices.copy()
     rows = np.flatnonzero(stays > turned)  # joined with their component's first one turned
-    oriented[rows, -2:] = simplices[rows][:, [-1, -2]]
-    return oriented, stays // 2
+    return exchanged(simplices, rows), stays // 2
 
 
 def _neighbours(simplices: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
