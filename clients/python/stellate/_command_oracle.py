@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import sys
 import threading
+import time
 import weakref
 from collections import deque
 from collections.abc import Iterator
@@ -13,12 +14,20 @@ from typing import Any, Callable, TypeVar
 import numpy as np
 
 from ._pipe.framing import Answer, CommandError, Question, reader
-from ._pipe.greeting import MOST_GREETING_BYTES, Garbled, Greeting, parse_greeting, quoted
-from ._pipe.process import Ended, Process
+from ._pipe.greeting import (
+    MOST_GREETING_BYTES,
+    Garbled,
+    Greeting,
+    may_become_greeting,
+    parse_greeting,
+    quoted,
+)
+from ._pipe.process import Ended, Patience, Process
 from .errors import InvalidArgument, NotConverged, OracleError
 
 _MOST_PROCESSES = 1024
 _REASON = "ORACLE_COMMAND"
+_UNUSUAL = 4  # times the longest batch so far: of a command that is slow always
 T = TypeVar("T")
 
 
@@ -36,6 +45,9 @@ class CommandOracle:
       silence_seconds: in a batch, without a byte read or written by it.
       on_restart: called with how a process ended otherwise than in order, when it is started again;
         by default that goes to the standard error.
+      on_waiting: called with what is waited for, "waiting for the oracle command's first answer, to 40
+        closest points, 5 s", once a process neither reads nor writes for `unremarked_seconds`, and for 4
+        times what its longest batch took; and again at each doubling. By default that goes there, too.
 
     A process that ends after it has answered a batch is started again and asked the same; once for a
     batch. What else goes wrong is an OracleError that says what, in which row, and what the command
@@ -60,6 +72,8 @@ class CommandOracle:
         start_seconds: float = 60.0,
         silence_seconds: float = 600.0,
         on_restart: Callable[[str], None] | None = None,
+        on_waiting: Callable[[str], None] | None = None,
+        unremarked_seconds: float = 5.0,
     ) -> None:
         if not command:
             raise InvalidArgument("the oracle command is empty")
@@ -67,7 +81,7 @@ class CommandOracle:
             raise InvalidArgument(
                 f"the number of processes has to be from 1 to {_MOST_PROCESSES}: {processes!r}"
             )
-        if not (start_seconds > 0 and silence_seconds > 0):
+        if not (start_seconds > 0 and silence_seconds > 0 and unremarked_seconds > 0):
             raise InvalidArgument("the seconds that a command has must be positive")
         self._options = {
             "command": command,
@@ -79,10 +93,13 @@ class CommandOracle:
             "start_seconds": start_seconds,
             "silence_seconds": silence_seconds,
             "on_restart": on_restart,
+            "on_waiting": on_waiting,
+            "unremarked_seconds": unremarked_seconds,
         }
         self.processes = processes
         self._command, self._on_restart = command, on_restart
         self._start_seconds, self._silence_seconds = start_seconds, silence_seconds
+        self._unremarked, self._on_waiting = unremarked_seconds, on_waiting or _say
         self._running: set[Process] = set()
         self._close = weakref.finalize(self, _end_all, self._running)
         self._idle: deque[_Speaker] = deque()
@@ -155,7 +172,7 @@ class CommandOracle:
         """Starts all processes, and then hears them."""
         try:
             for _ in range(self.processes):
-                self._idle.append(_Speaker(self._command, self._running))
+                self._idle.append(self._another())
             self._greeting = self._idle[0].greet(self._start_seconds)
             for speaker in list(self._idle)[1:]:
                 self._hear_again(speaker)
@@ -165,6 +182,9 @@ class CommandOracle:
             raise OracleError(
                 f"the oracle command {quoted(self._command)} cannot be started: {error}", _REASON
             ) from None
+
+    def _another(self) -> _Speaker:
+        return _Speaker(self._command, self._running, self._unremarked, self._on_waiting)
 
     def _settle(self, k: int | None, d: int | None, bounding_box: Any, seeds: Any) -> None:
         """The options and the command's first line become one."""
@@ -259,7 +279,7 @@ class CommandOracle:
             if not speaker[0].ended_well():
                 self._tell(str(error))
         speaker[0].end()
-        speaker[0] = _Speaker(self._command, self._running)
+        speaker[0] = self._another()
         self._hear_again(speaker[0])
         return speaker[0].ask(question, text, silence)
 
@@ -307,6 +327,10 @@ class CommandOracle:
             self._wake.notify_all()
 
 
+def _say(what: str) -> None:
+    print(f"stellate: {what}", file=sys.stderr)
+
+
 def _again(options: dict[str, Any]) -> CommandOracle:
     return CommandOracle(**options)
 
@@ -336,18 +360,34 @@ class _Speaker:
     """One process, from its first line on. What goes wrong is said in whole sentences, by Ended
     where the process ended, else by RuntimeError."""
 
-    def __init__(self, command: str, running: set[Process]) -> None:
+    def __init__(
+        self,
+        command: str,
+        running: set[Process],
+        unremarked: float,
+        on_waiting: Callable[[str], None],
+    ) -> None:
         self._command, self._running = command, running
+        self._unremarked, self._on_waiting = unremarked, on_waiting
         self._process = Process(command)
         running.add(self._process)
         self.has_answered = False
+        self._longest = 0.0  # seconds that a batch took
+
+    def _waiting_for(self, what: str, silence: float) -> Patience:
+        return Patience(
+            silence,
+            max(self._unremarked, _UNUSUAL * self._longest),
+            lambda seconds: self._on_waiting(f"waiting for {what}, {seconds:.0f} s"),
+        )
 
     def greet(self, seconds: float) -> Greeting:
         greetings: list[Greeting] = []
 
         def take(came: bytearray) -> bool:
             end = came.find(b"\n")
-            if end < 0 and len(came) <= MOST_GREETING_BYTES:
+            fits = may_become_greeting(bytes(came[:MOST_GREETING_BYTES]))
+            if end < 0 and fits and len(came) <= MOST_GREETING_BYTES:
                 return False
             end = end if end >= 0 else len(came)
             greetings.append(parse_greeting(bytes(came[:end])))
@@ -355,20 +395,26 @@ class _Speaker:
             return True
 
         def act() -> Greeting:
-            self._process.exchange(b"", take, seconds)
+            patience = self._waiting_for("the oracle command's first line", seconds)
+            self._process.exchange(b"", take, patience)
             return greetings[0]
 
         return self._guarded("at its first line", act)
 
     def ask(self, question: Question, text: bool, silence: float) -> Answer:
+        kind = "closest points" if question.bases is None else "flats"
+        batch = f"{len(question.points)} {kind}"
+        answer_to = "answer to" if self.has_answered else "first answer, to"
+
         def act() -> Answer:
-            answer = reader(question, text)
-            self._process.exchange(question.to_bytes(text), answer.take, silence)
+            answer, asked = reader(question, text), time.monotonic()
+            patience = self._waiting_for(f"the oracle command's {answer_to} {batch}", silence)
+            self._process.exchange(question.to_bytes(text), answer.take, patience)
             self.has_answered = True
+            self._longest = max(self._longest, time.monotonic() - asked)
             return answer.finish()
 
-        kind = "closest points" if question.bases is None else "flats"
-        return self._guarded(f"in a batch of {len(question.points)} {kind}", act)
+        return self._guarded(f"in a batch of {batch}", act)
 
     def end(self) -> None:
         self._process.end(hurry=True)

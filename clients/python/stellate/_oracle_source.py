@@ -140,5 +140,6 @@ def oracle_of(options: argparse.Namespace) -> Any:
         ambient_dimension=options.ambient_dimension,
         bounding_box=None if options.box is None else parse_box(options.box),
         seeds=None if options.seeds is None else parse_points(";".join(options.seeds)),
+        on_waiting=(lambda what: None) if getattr(options, "quiet", False) else None,
         **{name: value for name, value in given.items() if value is not None},
     )

@@ -13,6 +13,7 @@ from typing import Any, Callable, TypeVar
 import numpy as np
 
 from ._checkpoint import Checkpoint
+from ._command_oracle import CommandOracle
 from ._download import assemble
 from ._epsilon import Epsilon, choose
 from ._files.formats import save
@@ -23,6 +24,7 @@ from ._part_files import stream
 from ._places import Places
 from ._saved import SavedMesh
 from ._shared import table
+from ._waiting import Waiting
 from ._wire.spec import mesh_spec
 from ._worker import Ask, answer, check_max_chunk, join_all
 from .client import Client, MeshInfo
@@ -33,7 +35,7 @@ from .oracles import kept as part_of
 from .oracles._kept import Keep
 from .oracles._units import units_of
 from .progress import progress_bar
-from .report import Report
+from .report import Progress, Report
 from .server import Server
 
 _log = logging.getLogger("stellate")
@@ -61,7 +63,7 @@ class _Workers:
     ) -> None:
         """`on_failure` is called with each; what it raises in turn stays here."""
         self.failure: BaseException | None = None
-        self._on_failure = on_failure
+        self._on_failure, self._waiting = on_failure, Waiting()
         self._workers = [
             client.worker(
                 oracle,
@@ -94,6 +96,10 @@ class _Workers:
             self.failure = error
         self._on_failure(error)
 
+    def remark(self) -> str:
+        """What is to be said of an answer that takes long; else ""."""
+        return self._waiting.remark(self._workers)
+
     def stop(self) -> None:
         for worker in self._workers:
             worker.stop()
@@ -104,6 +110,21 @@ class _Workers:
 
     def join(self, seconds: float) -> None:
         join_all(self._threads, seconds)
+
+
+class _Shown:
+    """An `on_progress` that also tells the given one, at each progress, what there is to remark."""
+
+    def __init__(self, on_progress: OnProgress | None, remark: Callable[[], str]) -> None:
+        self._on_progress, self._remark = on_progress, remark
+        self.look = getattr(on_progress, "look", None)
+
+    def __call__(self, progress: Progress) -> None:
+        if self._on_progress is not None:
+            self._on_progress(progress)
+        text = self._remark()
+        if text:
+            _note(self._on_progress, text)
 
 
 @dataclasses.dataclass
@@ -179,7 +200,7 @@ class Run:
         if checkpoint is not None:
             choice = checkpoint.choose_epsilon
         self._on_progress, self._checkpoint, self._stays = on_progress, checkpoint, stays
-        self._to = tuple(to)
+        self._to, self._is_command = tuple(to), isinstance(oracle, CommandOracle)
         self._epsilon_reason = ""
         self._where_it_ends: Callable[[], str] | None = getattr(oracle, "where_it_ends", None)
         try:
@@ -229,9 +250,15 @@ class Run:
             raise
 
     def _follow(self, client: Client, info: MeshInfo, every: bool) -> Following | Arrival:
+        shown = _Shown(self._on_progress, self._remark)
         if self._to:
-            return Arrival(client, info, self._on_progress)
-        return Following(client, info, self._on_progress, every)
+            return Arrival(client, info, shown)
+        return Following(client, info, shown, every)
+
+    def _remark(self) -> str:
+        """What is to be said of an oracle that takes long; a command says that itself."""
+        workers = None if self._live is None else self._live.workers
+        return "" if workers is None or self._is_command else workers.remark()
 
     def _say(self, choice: tuple[float, str]) -> float:
         """Reports an epsilon that was chosen, with a reason, and returns it."""

@@ -205,6 +205,8 @@ class Worker:
             worker=name,
             max_chunk_queries=min(most, check_max_chunk(max_chunk) or most),
         )
+        self.at_work: tuple[float, str] | None = None  # see Waiting
+        self.longest = 0.0
         self._call: Any = None
         self._attempts = Reconnector(policy, quiet)
         self._trace = trace_headers()  # of who has it serve, on whatever thread it does
@@ -271,7 +273,7 @@ class Worker:
                     raise unknown
                 outbox.begin(response.queries.lease)
                 try:
-                    reply = self._ask(self._oracle, response.queries)
+                    reply = self._timed(response.queries)
                 except ExecutorError:
                     raise  # no failure of the oracle: another worker may go on
                 except BaseException as error:
@@ -289,6 +291,16 @@ class Worker:
                 state = enums.state_of(response.over.state)
                 outbox.end()
         return state
+
+    def _timed(self, chunk: pb.QueryChunk) -> pb.ServeOracleRequest:
+        flats = chunk.kind == pb.QUERY_KIND_INTERSECT_FLAT
+        count, began = chunk.points.shape[0], time.monotonic()
+        self.at_work = (began, f"{count} {'flats' if flats else 'closest points'}")
+        try:
+            return self._ask(self._oracle, chunk)
+        finally:
+            self.at_work = None
+            self.longest = max(self.longest, time.monotonic() - began)
 
     def _may_be_told_to_leave(self) -> bool:
         """Whether a KeyboardInterrupt may be Ctrl-C: that is for the main thread, or for processes of an

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import multiprocessing
+import re
 import shutil
 import sys
 import threading
@@ -117,11 +118,13 @@ class Patience:
         self._timer.cancel()
 
     def __call__(self, progress: Progress) -> None:
+        if not progress.vertices and not progress.queries:
+            return
         self._so_far = f"{progress.vertices:,} vertices by {progress.queries:,} queries so far"
 
     def note(self, text: str) -> None:
         """As a ProgressBar's."""
-        self._so_far = text
+        self._so_far = re.sub(r", \d+ s$", "", text)  # the time that is said is this one's
 
     def _speak(self) -> None:
         self._file.write(

@@ -171,6 +171,7 @@ WRONG_COMMANDS = {
     "is not a box": greeting("binary box=1,1:0,0"),
     "is not a list of points": greeting("binary seeds=1,2;3"),
     "its first line never came": "sleep 60",
+    "is 'Welcome'; if": "printf Welcome; exec sleep 60",  # without the end of a line
 }
 WRONG_ANSWERS = {
     "it closed its standard output, after it took 4816 of 4816 bytes": f"head -c {BATCH} >/dev/null",
@@ -195,6 +196,24 @@ def test_a_command_that_does_not_begin(words):
     with pytest.raises(stellate.OracleError) as error:
         CommandOracle(command, start_seconds=0.5 if command.startswith("sleep") else 30.0)
     assert words in str(error.value) and error.value.reason == "ORACLE_COMMAND"
+
+
+def test_what_keeps_waiting_is_told(capfd):
+    told = []
+    more = {"on_waiting": told.append, "unremarked_seconds": 0.01}
+    with pytest.raises(stellate.OracleError, match="its first line never came"):
+        CommandOracle("exec sleep 60", start_seconds=0.3, **more)
+    first = "waiting for the oracle command's first line, 0 s"
+    assert set(told) == {first} and len(told) <= 5  # at .01, .02, .04, ... of .3 seconds
+    told.clear()
+    with CommandOracle(greeting(FULL, "exec sleep 60"), silence_seconds=0.3, **more) as oracle:
+        with pytest.raises(stellate.OracleError, match="read nor written"):
+            oracle.closest_point(X)
+    answer = f"waiting for the oracle command's first answer, to {len(X)} closest points, 0 s"
+    assert set(told) - {first} == {answer}
+    with pytest.raises(stellate.OracleError, match="its first line never came"):
+        CommandOracle("exec sleep 60", start_seconds=0.3, unremarked_seconds=0.1)
+    assert f"stellate: {first}" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize("words", WRONG_ANSWERS)

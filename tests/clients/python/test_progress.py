@@ -91,6 +91,19 @@ def test_who_gave_no_progress_is_told_once_that_work_goes_on():
     assert "on_progress=stellate.progress_bar()" in screen.getvalue()
 
 
+def test_what_was_noted_is_said_without_its_time_until_there_is_an_answer():
+    screen = Heard()
+    patience = stellate.progress.Patience(screen, 0.0)
+    patience.note("waiting for the oracle's first answer, to 9 closest points, 5 s")
+    patience(dataclasses.replace(progress(), vertices=0, queries=0))
+    with patience:
+        assert screen.spoke.wait(60)
+    assert (
+        "for 0 s, waiting for the oracle's first answer, to 9 closest points; on"
+        in screen.getvalue()
+    )
+
+
 def test_what_is_over_soon_says_nothing():
     screen = Heard()
     with stellate.progress.Patience(screen, 3600.0) as patience:

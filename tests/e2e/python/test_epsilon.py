@@ -1,13 +1,17 @@
 """epsilon: always asked for, or found from the oracle's answers."""
 
+import functools
 import io
+import re
 import subprocess
+import threading
 
 import numpy as np
 import pytest
 import stellate
 from stellate import manifolds
 from stellate._command_line import main
+from stellate._waiting import Waiting
 from stellate.viewer import find_stellate
 
 
@@ -112,6 +116,30 @@ def test_a_mesh_that_takes_long_says_so_on_a_terminal(epsilon, server, monkeypat
     assert line.startswith("stellate: at work for ") and (asked in line) == (epsilon == "auto")
     stellate.mesh(manifolds.Torus(), 0.3, server, on_progress=lambda progress: None)
     assert len(waiting) == 1
+
+
+@pytest.mark.parametrize("batch", [1, 4])
+def test_an_oracle_that_hangs_is_named_as_what_is_waited_for(batch, server, monkeypatch):
+    told, goes_on, calls = [], threading.Event(), []
+
+    class Hanging(manifolds.Torus):
+        def closest_point(self, x):
+            calls.append(len(x))
+            if len(calls) == batch:
+                goes_on.wait()
+            return super().closest_point(x)
+
+    class Bar(stellate.progress.ProgressBar):
+        def note(self, text):
+            told.append(text)
+            if calls[batch - 1 :]:  # not of one that was only slow
+                goes_on.set()
+
+    monkeypatch.setattr("stellate._run.Waiting", functools.partial(Waiting, 0.01))
+    monkeypatch.setattr("stellate._waiting._UNUSUAL", 0)
+    assert stellate.mesh(Hanging(), 0.3, server, on_progress=Bar("", io.StringIO())).certified
+    which = "first answer, to" if batch == 1 else "answer to"
+    assert re.fullmatch(rf"waiting for the oracle's {which} \d+ \w.*, \d+ s", told[-1])
 
 
 def test_a_note_breaks_a_live_line():

@@ -9,6 +9,7 @@ import numpy as np
 from ..errors import InvalidArgument
 
 MOST_GREETING_BYTES = 1 << 20
+_FIRST_WORD = b"stellate-oracle"
 _MOST_WALLS = 64
 _MOST_DIMENSIONS = 1 << 20  # servers allow far less
 
@@ -72,10 +73,16 @@ class Greeting:
     about: str = dataclasses.field(default="", compare=False)
 
 
+def may_become_greeting(begun: bytes) -> bool:
+    """Whether a first line begins so. What does not is never one, whatever follows."""
+    begun = begun.lstrip(b" \t")
+    return _FIRST_WORD.startswith(begun[: len(_FIRST_WORD)])
+
+
 def parse_greeting(line: bytes) -> Greeting:
     """The line without its end. Raises: Garbled."""
     words = line.decode(errors="replace").split()
-    if not words or words[0] != "stellate-oracle":
+    if not words or words[0] != _FIRST_WORD.decode():
         raise Garbled(
             "its first line has to be 'stellate-oracle 1 binary ...' or 'stellate-oracle 1 text "
             f"...' and is {quoted(line)}; if that is a banner, there is an option to be without, "

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import dataclasses
 import os
 import select
 import signal
@@ -17,6 +18,21 @@ _LAST_WORDS = 1.0  # seconds from closed pipes to the end
 _KEPT_ERRORS = 4000  # bytes; a server takes 4096 for a failure in all
 _SHOWN_LINES = 10
 _READ_BYTES = 1 << 16
+
+
+@dataclasses.dataclass(frozen=True)
+class Patience:
+    """How long a process may be silent, in seconds without a byte read or written by it.
+
+    Attributes:
+      silence: then it has failed.
+      unremarked: then, and whenever the silence has doubled, `on_waiting` is called with how long it has
+        lasted.
+    """
+
+    silence: float
+    unremarked: float
+    on_waiting: Callable[[float], None]
 
 
 class Ended(Exception):
@@ -46,17 +62,20 @@ class Process:
         self._over = False
         self._status: int | None = None  # of its exit, or minus the signal's number
 
-    def exchange(self, question: bytes, take: Callable[[bytearray], bool], silence: float) -> None:
+    def exchange(
+        self, question: bytes, take: Callable[[bytearray], bool], patience: Patience
+    ) -> None:
         """Writes the question and at the same time reads, until `take` is content with what came.
 
-        Nothing is left unread then. Raises: Ended; RuntimeError when the process moves no byte for
-        `silence` seconds, or says more than it should; and what `take` raises.
+        Nothing is left unread then. Raises: Ended; RuntimeError when the process is silent for too long, or
+        says more than it should; and what `take` raises.
         """
         if self.unread:
             self._too_much(question, len(question))
-        left, done, deadline = memoryview(question), False, time.monotonic() + silence
+        left, done, silence = memoryview(question), False, patience.silence
+        last, remark = time.monotonic(), patience.unremarked
         while not done:
-            read, written = self._wait(bool(left), deadline)
+            read, written = self._wait(bool(left), last + min(silence, remark))
             moved = False
             if read:  # first: who closes its input may have answered nevertheless
                 moved = self._read(_standing(question, len(left)))
@@ -64,13 +83,17 @@ class Process:
             if written and not done:
                 count = self._write(left, _standing(question, len(left)))
                 left, moved = left[count:], moved or count > 0
+            now = time.monotonic()
             if moved:
-                deadline = time.monotonic() + silence
-            elif not done and time.monotonic() >= deadline:
+                last, remark = now, patience.unremarked
+            elif not done and now >= last + silence:
                 raise RuntimeError(
                     f"it has neither read nor written for {silence:g} seconds"
                     + _standing(question, len(left))
                 )
+            elif not done and now >= last + remark:
+                patience.on_waiting(now - last)
+                remark *= 2
         if left or self.unread:
             self._too_much(question, len(left))
 
