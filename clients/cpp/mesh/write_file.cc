@@ -30,6 +30,27 @@ std::string DraftOf(const std::string& target) {
   return target + ".part-" + std::to_string(getpid()) + "-" + std::to_string(++count);
 }
 
+bool GiveName(int file, const std::string& name) {
+  const std::string own = "/proc/self/fd/" + std::to_string(file);
+  return linkat(AT_FDCWD, own.c_str(), AT_FDCWD, name.c_str(), AT_SYMLINK_FOLLOW) == 0;
+}
+
+// A file that is gone if the process is killed, in the folder of `name`, which it can be given
+// later; below 0 where the file system has no such files. Another one tries that: a mesh of hours
+// must not find out in the end.
+int OpenWithoutName(const std::string& name) {
+  const std::string folder = std::filesystem::path(name).parent_path().string();
+  const auto open_one = [&folder] {
+    return open(folder.empty() ? "." : folder.c_str(), O_WRONLY | O_TMPFILE | O_CLOEXEC, 0666);
+  };
+  const int other = open_one();
+  if (other < 0) return -1;
+  const bool can_be_named = GiveName(other, name);
+  if (can_be_named) unlink(name.c_str());
+  close(other);
+  return can_be_named ? open_one() : -1;
+}
+
 }  // namespace
 
 bool Draft::IsSpecial(const std::string& path) {
@@ -41,12 +62,14 @@ Expected<Draft> Draft::Begin(const std::string& path) {
   if (IsSpecial(path)) {
     const int file = open(path.c_str(), O_WRONLY | O_CLOEXEC);
     if (file < 0) return CannotWrite(path, errno);
-    return Draft(path, path, "", file);
+    return Draft(path, path, "", file, false);
   }
   const std::string target = Target(path), name = DraftOf(target);
-  const int file = open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
+  int file = OpenWithoutName(name);
+  const bool has_name = file < 0;
+  if (has_name) file = open(name.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
   if (file < 0) return CannotWrite(path, errno);
-  Draft draft(path, target, name, file);
+  Draft draft(path, target, name, file, has_name);
   struct stat old;
   if (stat(target.c_str(), &old) == 0 && fchmod(file, old.st_mode & 07777) != 0)
     return CannotWrite(path, errno);
@@ -58,13 +81,14 @@ Draft::Draft(Draft&& other) noexcept
       target_(std::move(other.target_)),
       draft_(std::exchange(other.draft_, {})),
       file_(std::exchange(other.file_, -1)),
+      has_name_(std::exchange(other.has_name_, false)),
       end_(other.end_) {}
 
 Draft::~Draft() { Drop(); }
 
 void Draft::Drop() {
   if (file_ >= 0) close(std::exchange(file_, -1));
-  if (!draft_.empty()) unlink(std::exchange(draft_, {}).c_str());
+  if (std::exchange(has_name_, false)) unlink(draft_.c_str());
 }
 
 Expected<void> Draft::WriteAt(std::uint64_t place, std::string_view bytes) {
@@ -89,10 +113,14 @@ Expected<void> Draft::Keep() {
 
 Expected<void> Draft::Finish() {
   if (auto ok = Keep(); !ok) return ok;
+  if (!draft_.empty() && !has_name_) {
+    has_name_ = GiveName(file_, draft_);
+    if (!has_name_) return CannotWrite(path_, errno);
+  }
   if (close(std::exchange(file_, -1)) != 0) return CannotWrite(path_, errno);
   if (draft_.empty()) return {};
   if (rename(draft_.c_str(), target_.c_str()) != 0) return CannotWrite(path_, errno);
-  draft_.clear();
+  has_name_ = false;
   return {};
 }
 

@@ -9,7 +9,8 @@
 namespace stellate::client {
 
 // A file that is written piece by piece beside the path, and takes its place when it is whole.
-// What is not finished leaves no trace, and the old file. Errors are kFileFailed, with the system's
+// What is not finished leaves no trace, and the old file; also where the process is killed, if the
+// file system has files without names. Errors are kFileFailed, with the system's
 // reason.
 //
 //   Expected<Draft> draft = Draft::Begin(path);
@@ -33,12 +34,17 @@ class Draft {
   Expected<void> Finish();
 
  private:
-  Draft(std::string path, std::string target, std::string draft, int file)
-      : path_(std::move(path)), target_(std::move(target)), draft_(std::move(draft)), file_(file) {}
+  Draft(std::string path, std::string target, std::string draft, int file, bool has_name)
+      : path_(std::move(path)),
+        target_(std::move(target)),
+        draft_(std::move(draft)),
+        file_(file),
+        has_name_(has_name) {}
   void Drop();
 
   std::string path_, target_, draft_;  // the last empty: written as it is
   int file_ = -1;
+  bool has_name_ = false;  // draft_; else that is for a moment before it takes its place
   std::uint64_t end_ = 0;
 };
 

@@ -1,3 +1,4 @@
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
@@ -555,6 +556,22 @@ TEST_F(MeshFile, AFileIsReplacedWholeOrNotAtAll) {
   for (const auto& entry : std::filesystem::directory_iterator(directory_)) {
     EXPECT_EQ(entry.path().string().find(".part-"), std::string::npos) << entry.path();
   }
+}
+
+TEST_F(MeshFile, AProcessThatIsKilledLeavesNothing) {
+  const int nameless = open(directory_.c_str(), O_WRONLY | O_TMPFILE, 0600);
+  if (nameless < 0) GTEST_SKIP() << "this file system has no files without names";
+  close(nameless);
+  const pid_t child = fork();
+  if (child == 0) {
+    Expected<client::Draft> draft = client::Draft::Begin(Path("a.txt"));
+    if (draft && draft->Write("half") && draft->Keep()) raise(SIGKILL);
+    _exit(1);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  EXPECT_TRUE(WIFSIGNALED(status));
+  EXPECT_TRUE(std::filesystem::is_empty(directory_));
 }
 
 TEST_F(MeshFile, SaysWhyAFileCannotBeWritten) {
