@@ -5,6 +5,13 @@ set(names_server stellate-server)
 set(names_tools stellate-tools)
 set(names_development libstellate-dev)
 set(names_python python3-stellate)
+set(names_mpi stellate-mpi)
+set(of_debian server tools development python)
+set(manuals server tools)
+if(STELLATE_MPI)
+  list(APPEND of_debian mpi)
+  list(APPEND manuals mpi)
+endif()
 
 # The unit that packaging/install takes to /usr/local, for /usr.
 set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS packaging/stellated.service)
@@ -25,7 +32,7 @@ configure_file(cmake/install_python.cmake.in install_python.cmake @ONLY)
 install(SCRIPT ${PROJECT_BINARY_DIR}/install_python.cmake COMPONENT python EXCLUDE_FROM_ALL)
 
 # Manual pages, of what the programs say with --help.
-foreach(part server tools)
+foreach(part ${manuals})
   install(CODE "
     execute_process(COMMAND ${PROJECT_SOURCE_DIR}/packaging/manual
       ${CMAKE_RUNTIME_OUTPUT_DIRECTORY} ${part} ${PROJECT_BINARY_DIR}/man/${part}
@@ -34,8 +41,12 @@ endforeach()
 install(DIRECTORY ${PROJECT_BINARY_DIR}/man/server/ DESTINATION share/man/man8 ${of_server})
 install(DIRECTORY ${PROJECT_BINARY_DIR}/man/tools/ DESTINATION share/man/man1
   COMPONENT tools EXCLUDE_FROM_ALL)
+if(STELLATE_MPI)
+  install(DIRECTORY ${PROJECT_BINARY_DIR}/man/mpi/ DESTINATION share/man/man1
+    COMPONENT mpi EXCLUDE_FROM_ALL)
+endif()
 
-foreach(component server tools development python)
+foreach(component ${of_debian})
   set(name ${names_${component}})
   install(FILES LICENSE DESTINATION share/doc/${name} RENAME copyright
     COMPONENT ${component} EXCLUDE_FROM_ALL)
@@ -62,6 +73,13 @@ and probes oracles.")
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_RECOMMENDS "stellate-server (= ${PROJECT_VERSION})")
+
+set(CPACK_COMPONENT_MPI_DESCRIPTION "Meshes smooth manifolds: in the ranks of an MPI job
+The program stellate-mpi makes one mesh in all ranks of a job, with an oracle in
+each and without a server, and writes it whole or a piece a rank.")
+set(CPACK_DEBIAN_MPI_PACKAGE_SECTION science)
+set(CPACK_DEBIAN_MPI_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_MPI_PACKAGE_DEPENDS openmpi-bin)
 
 set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "Meshes smooth manifolds: C++ libraries
 Static libraries, headers, CMake package and pkg-config files: a client of the
@@ -90,7 +108,7 @@ set(CPACK_PACKAGE_VERSION ${PROJECT_VERSION})
 set(CPACK_RESOURCE_FILE_LICENSE ${PROJECT_SOURCE_DIR}/LICENSE)
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
-set(CPACK_COMPONENTS_ALL server tools development python)
+set(CPACK_COMPONENTS_ALL ${of_debian})
 set(CPACK_COMPONENTS_GROUPING IGNORE)  # a package each
 set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
