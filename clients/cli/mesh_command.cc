@@ -45,7 +45,7 @@ MeshCommand::MeshCommand(CLI::App& parent)
 }
 
 int MeshCommand::Run(std::stop_token stop) {
-  const Expected<std::unique_ptr<Oracle>> made = source_.Make(stop);
+  const Expected<std::unique_ptr<Oracle>> made = source_.Make(stop, report_.is_quiet());
   if (!made) return PrintError(made.error());
   Oracle& oracle = **made;
   if (closest_point_only_ && oracle.walls() > 0) {

@@ -1,5 +1,7 @@
 #include "oracle_source.h"
 
+#include <unistd.h>
+
 #include <CLI/CLI.hpp>
 #include <cstdio>
 #include <stdexcept>
@@ -191,8 +193,8 @@ Expected<void> OracleSource::ReadWhereabouts() {
   return {};
 }
 
-Expected<std::unique_ptr<Oracle>> OracleSource::Make(std::stop_token stop) {
-  auto made = MakeUnclipped(std::move(stop));
+Expected<std::unique_ptr<Oracle>> OracleSource::Make(std::stop_token stop, bool quiet) {
+  auto made = MakeUnclipped(std::move(stop), quiet);
   if (made) made = Clip(std::move(*made), clips_);
   if (!made || scale_.empty()) return made;
   const auto axes = static_cast<Eigen::Index>(scale_.size());
@@ -223,7 +225,7 @@ Expected<std::unique_ptr<Oracle>> OracleSource::MakeSolid() const {
   }
 }
 
-Expected<std::unique_ptr<Oracle>> OracleSource::MakeUnclipped(std::stop_token stop) {
+Expected<std::unique_ptr<Oracle>> OracleSource::MakeUnclipped(std::stop_token stop, bool quiet) {
   if (!solid_.empty() || !materials_.empty()) return MakeSolid();
   if (command_.command.empty()) {
     if (manifold_.empty()) return NoSuch("name a manifold, or give --solid or --oracle-command");
@@ -239,6 +241,13 @@ Expected<std::unique_ptr<Oracle>> OracleSource::MakeUnclipped(std::stop_token st
   command_.on_restart = [](const std::string& how) {
     std::fprintf(stderr, "stellate: %s\nstellate: it is started again\n", how.c_str());
   };
+  if (!quiet) {
+    command_.on_waiting = [](const std::string& what) {
+      // Over a line of progress, which is drawn anew.
+      const char* const over = isatty(STDERR_FILENO) == 1 ? "\r\033[K" : "";
+      std::fprintf(stderr, "%sstellate: %s\n", over, what.c_str());
+    };
+  }
   return StartCommand(command_);
 }
 

@@ -18,8 +18,9 @@ class OracleSource {
  public:
   explicit OracleSource(CLI::App* command);
 
-  // The oracle, its processes started. A stop ends them.
-  Expected<std::unique_ptr<Oracle>> Make(std::stop_token stop);
+  // The oracle, its processes started. A stop ends them. What a command keeps waiting is said on
+  // standard error, unless `quiet`.
+  Expected<std::unique_ptr<Oracle>> Make(std::stop_token stop, bool quiet = false);
 
   // For labels and messages.
   std::string name() const;
@@ -29,7 +30,7 @@ class OracleSource {
  private:
   Expected<void> ReadWhereabouts();
   Expected<std::unique_ptr<Oracle>> MakeSolid() const;
-  Expected<std::unique_ptr<Oracle>> MakeUnclipped(std::stop_token stop);
+  Expected<std::unique_ptr<Oracle>> MakeUnclipped(std::stop_token stop, bool quiet);
 
   std::string manifold_, solid_, box_;
   std::vector<std::string> seeds_, clips_, materials_;

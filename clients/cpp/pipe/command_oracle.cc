@@ -1,6 +1,9 @@
 #include "stellate/command_oracle.h"
 
+#include <algorithm>
 #include <atomic>
+#include <chrono>
+#include <cmath>
 #include <condition_variable>
 #include <deque>
 #include <exception>
@@ -12,10 +15,15 @@
 #include "pipe/exchange.h"
 #include "pipe/framing.h"
 #include "pipe/numbers.h"
+#include "stellate/connection.h"
 
 namespace stellate {
 namespace pipe {
 namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr double kUnusual = 4;  // times the longest batch so far: of an oracle that is slow always
 
 // One process, from its first line on.
 class Speaker {
@@ -49,28 +57,42 @@ class Speaker {
           process_, "",
           [&greeting](std::string* came) {
             const size_t end = came->find('\n');
-            if (end == std::string::npos && came->size() <= kMaxGreetingBytes) return false;
+            const bool fits = MayBecomeGreeting(*came) && came->size() <= kMaxGreetingBytes;
+            if (end == std::string::npos && fits) return false;
             greeting = ParseGreeting(std::string_view(*came).substr(0, end));
             came->erase(0, end + 1);
             return true;
           },
-          std::chrono::duration<double>(options_.start_seconds), stop_);
+          WaitingFor(options_.start_seconds, "the oracle command's first line"), stop_);
       return greeting;
     });
   }
 
   Answer Ask(const Question& question, bool text) {
-    const std::string where = "in a batch of " + std::to_string(question.points.cols()) +
+    const std::string batch = std::to_string(question.points.cols()) +
                               (question.bases != nullptr ? " flats" : " closest points");
-    return Guarded(where, [&] {
+    const std::string awaited = has_answered_ ? "the oracle command's answer to " + batch
+                                              : "the oracle command's first answer, to " + batch;
+    return Guarded("in a batch of " + batch, [&] {
+      const auto asked = Clock::now();
       const std::unique_ptr<AnswerReader> reader = AnswerReader::Make(question, text);
       Exchange(
           process_, ToBytes(question, text),
           [&reader](std::string* came) { return reader->Take(came); },
-          std::chrono::duration<double>(options_.silence_seconds), stop_);
+          WaitingFor(options_.silence_seconds, awaited), stop_);
       has_answered_ = true;
+      longest_ = std::max<Seconds>(longest_, Clock::now() - asked);
       return reader->Finish();
     });
+  }
+
+  Patience WaitingFor(double silence, const std::string& what) const {
+    const Seconds unremarked = std::max(Seconds(options_.unremarked_seconds), kUnusual * longest_);
+    if (!options_.on_waiting) return {Seconds(silence), unremarked};
+    return {Seconds(silence), unremarked, [this, what](double seconds) {
+              options_.on_waiting("waiting for " + what + ", " +
+                                  std::to_string(std::lround(seconds)) + " s");
+            }};
   }
 
   // Its end may come: it is not waited for.
@@ -88,6 +110,7 @@ class Speaker {
   const StopSignal& stop_;
   Process process_;
   bool has_answered_ = false;
+  Seconds longest_{0};  // that a batch took
 };
 
 bool Same(const Greeting& a, const Greeting& b) {
@@ -309,7 +332,8 @@ Expected<std::unique_ptr<Oracle>> StartCommand(const CommandOptions& options) {
     return Fail(ErrorCode::kRefused,
                 "the number of processes has to be from 1 to " + std::to_string(kMostProcesses));
   }
-  if (!(options.start_seconds > 0) || !(options.silence_seconds > 0)) {
+  if (!(options.start_seconds > 0) || !(options.silence_seconds > 0) ||
+      !(options.unremarked_seconds > 0)) {
     return Fail(ErrorCode::kRefused, "the seconds that a command has must be positive");
   }
   auto oracle = std::make_unique<pipe::CommandOracle>(options);

@@ -55,25 +55,37 @@ class Conversation {
         take_(take),
         stop_(stop) {}
 
-  void Run(std::chrono::duration<double> silence) {
-    const auto patience = std::chrono::duration_cast<Clock::duration>(silence);
+  void Run(const Patience& patience) {
     if (!process_.unread.empty()) TooMuch();
-    Clock::time_point deadline = Clock::now() + patience;
+    const auto silence = std::chrono::duration_cast<Clock::duration>(patience.silence);
+    const auto unremarked = std::chrono::duration_cast<Clock::duration>(patience.unremarked);
+    Clock::time_point moved = Clock::now();
+    Clock::duration remark = patience.on_waiting ? unremarked : silence;
     while (!done_) {
-      Wait(std::min(deadline, stop_.deadline()));
-      if (Move()) deadline = Clock::now() + patience;
+      Wait(std::min(moved + std::min(silence, remark), stop_.deadline()));
+      if (Move()) {
+        moved = Clock::now();
+        remark = patience.on_waiting ? unremarked : silence;
+      }
       const Clock::time_point now = Clock::now();
-      if (done_ || now < std::min(deadline, stop_.deadline())) continue;
+      if (done_) break;
       if (now >= stop_.deadline()) throw std::runtime_error("it was asked to stop");
-      char seconds[32];
-      std::snprintf(seconds, sizeof seconds, "%g", silence.count());
-      throw std::runtime_error("it has neither read nor written for " + std::string(seconds) +
-                               " seconds" + Standing());
+      if (now >= moved + silence) GiveUp(patience.silence.count());
+      if (now < moved + remark) continue;
+      patience.on_waiting(std::chrono::duration<double>(now - moved).count());
+      remark *= 2;
     }
     if (!unwritten_.empty() || !process_.unread.empty()) TooMuch();
   }
 
  private:
+  [[noreturn]] void GiveUp(double silence) const {
+    char seconds[32];
+    std::snprintf(seconds, sizeof seconds, "%g", silence);
+    throw std::runtime_error("it has neither read nor written for " + std::string(seconds) +
+                             " seconds" + Standing());
+  }
+
   void Wait(Clock::time_point until) {
     const bool stopping = stop_.deadline() != Clock::time_point::max();
     fds_ = {pollfd{unwritten_.empty() ? -1 : process_.input.get(), POLLOUT, 0},
@@ -155,10 +167,10 @@ void StopSignal::Raise() {
 }
 
 void Exchange(Process& process, std::string_view question,
-              const std::function<bool(std::string*)>& take, std::chrono::duration<double> silence,
+              const std::function<bool(std::string*)>& take, const Patience& patience,
               const StopSignal& stop) {
   const WithoutSigpipe quiet;
-  Conversation(process, question, take, stop).Run(silence);
+  Conversation(process, question, take, stop).Run(patience);
 }
 
 }  // namespace stellate::pipe

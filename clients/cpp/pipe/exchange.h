@@ -35,13 +35,21 @@ class StopSignal {
   std::stop_callback<std::function<void()>> callback_;  // last: it may be called immediately
 };
 
+// How long a process may be silent, in seconds without a byte read or written by it.
+struct Patience {
+  std::chrono::duration<double> silence;  // then it has failed
+  // Then, and whenever the silence has doubled, `on_waiting` is called with how long it has lasted.
+  std::chrono::duration<double> unremarked;
+  std::function<void(double)> on_waiting = {};
+};
+
 // Writes `question` and at the same time reads, until `take` is content with what came; `take` is
 // called with process.unread whenever there is more. Nothing is left unread then.
 //
-// Throws Ended; std::runtime_error when the process moves no byte for `silence`, says more than
-// it should or was stopped; and what `take` throws.
+// Throws Ended; std::runtime_error when the process is silent for too long, says more than it
+// should or was stopped; and what `take` throws.
 void Exchange(Process& process, std::string_view question,
-              const std::function<bool(std::string*)>& take, std::chrono::duration<double> silence,
+              const std::function<bool(std::string*)>& take, const Patience& patience,
               const StopSignal& stop);
 
 }  // namespace stellate::pipe

@@ -33,6 +33,9 @@ struct Greeting {
   std::string about;
 };
 
+// Whether `begun` is how a first line begins. What is not is never one, whatever follows.
+bool MayBecomeGreeting(std::string_view begun);
+
 // `line` without its end. Throws Garbled.
 Greeting ParseGreeting(std::string_view line);
 

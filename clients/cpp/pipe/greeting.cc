@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <charconv>
 
 #include "pipe/framing.h"
@@ -102,6 +103,12 @@ void Understand(std::string_view word, Greeting* greeting) {
 }
 
 }  // namespace
+
+bool MayBecomeGreeting(std::string_view begun) {
+  begun.remove_prefix(std::min(begun.find_first_not_of(" \t"), begun.size()));
+  const size_t length = std::min(begun.size(), kFirstWord.size());
+  return begun.substr(0, length) == kFirstWord.substr(0, length);
+}
 
 Greeting ParseGreeting(std::string_view line) {
   const std::vector<std::string_view> words = Words(line);

@@ -23,7 +23,7 @@ class AtWork(Protocol):
 
 
 class Waiting:
-    """Looks at workers now and then, and says which answer is waited for, at each doubling anew."""
+    """Looks at workers now and then, and says which answer is waited for, again at each doubling."""
 
     def __init__(self, unremarked: float = _UNREMARKED) -> None:
         self._unremarked = unremarked

@@ -21,7 +21,8 @@ namespace stellate {
 namespace {
 
 namespace fs = std::filesystem;
-using ::testing::HasSubstr;
+using ::testing::Contains, ::testing::Each, ::testing::HasSubstr, ::testing::IsEmpty,
+    ::testing::Not, ::testing::StartsWith;
 
 constexpr const char* kTorus = "k=2 d=3 box=-1.5,-1.5,-0.5:1.5,1.5,0.5";
 
@@ -214,6 +215,34 @@ TEST_F(CommandOracle, SilenceIsNotBorneForEver) {
   EXPECT_THAT(
       ErrorOf(options),
       HasSubstr("it has neither read nor written for 0.2 seconds, after it took 50 of 50 bytes"));
+}
+
+TEST_F(CommandOracle, WhatKeepsWaitingIsTold) {
+  const auto told_of = [](CommandOptions options) {
+    std::vector<std::string> told;
+    options.on_waiting = [&told](const std::string& what) { told.push_back(what); };
+    options.unremarked_seconds = 0.01;
+    options.silence_seconds = 0.3;
+    EXPECT_THAT(ErrorOf(options), HasSubstr("seconds"));
+    return told;
+  };
+  CommandOptions silent = Options("exec sleep 1000");
+  silent.start_seconds = 0.3;
+  const std::vector<std::string> at_first = told_of(silent);
+  EXPECT_LE(std::ssize(at_first), 5);  // at .01, .02, .04, ... of .3 seconds
+  EXPECT_THAT(at_first, Each(StartsWith("waiting for the oracle command's first line, ")));
+  EXPECT_THAT(at_first, Not(IsEmpty()));
+  const auto later =
+      told_of(Options("echo stellate-oracle 1 text " + std::string(kTorus) + "; exec sleep 1000"));
+  EXPECT_THAT(later, Contains("waiting for the oracle command's first answer, to 3 closest points, "
+                              "0 s"));
+}
+
+// What has no end of line would be waited for, whatever it was.
+TEST_F(CommandOracle, AFirstLineThatCanBeNoneIsRefusedAsItComes) {
+  EXPECT_THAT(ErrorOf(Options("printf Welcome; exec sleep 1000")), HasSubstr("is 'Welcome'"));
+  EXPECT_TRUE(StartCommand(Options("printf '  stellate-'; sleep 0.1; printf 'oracle 1 text " +
+                                   std::string(kTorus) + "\\n'; exec cat >/dev/null")));
 }
 
 TEST_F(CommandOracle, OptionsAndCommandHaveToAgree) {

@@ -32,6 +32,11 @@ struct CommandOptions {
   // Called with how a process ended unexpectedly, when it is started again; on the thread that sent
   // the batch.
   std::function<void(const std::string&)> on_restart;
+  // Called with what is waited for, "waiting for the oracle command's first answer, to 40 closest
+  // points, 5 s", once a process neither reads nor writes for so many seconds, and for 4 times what
+  // its longest batch took; and again at each doubling. On the thread that waits.
+  std::function<void(const std::string&)> on_waiting = {};
+  double unremarked_seconds = 5;
 };
 
 // An oracle that is a program in any language: it reads batches of queries from its standard input
