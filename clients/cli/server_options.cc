@@ -10,6 +10,14 @@
 #include "text/printable.h"
 
 namespace stellate::cli {
+namespace {
+
+std::string FromEnvironment(const char* name) {
+  const char* const value = std::getenv(name);
+  return value == nullptr ? "" : value;
+}
+
+}  // namespace
 
 ServerOptions::ServerOptions(CLI::App* command, const std::string& default_address) {
   connection_.server = default_address;
@@ -39,11 +47,12 @@ void ServerOptions::AddReconnect(CLI::App* command) {
 
 Expected<Connection> ServerOptions::Read() const {
   Connection connection = connection_;
+  // As OpenTelemetry has programs hand a trace on to those that they start.
+  connection.trace = {FromEnvironment("TRACEPARENT"), FromEnvironment("TRACESTATE")};
   if (connection.server.empty()) return connection;
   std::string& token = connection.credentials.token;
   if (token_file_.empty()) {
-    const char* const from_environment = std::getenv("STELLATE_TOKEN");
-    if (from_environment != nullptr) token = from_environment;
+    token = FromEnvironment("STELLATE_TOKEN");
     return connection;
   }
   std::ifstream file(token_file_);

@@ -67,7 +67,7 @@ func NewClient(to Connection) (*Client, error) {
 	if staysOnThisMachine(address) {
 		options = append(options, grpc.WithNoProxy())
 	}
-	connection, err := grpc.NewClient(address, options...)
+	connection, err := grpc.NewClient(address, append(options, to.DialOptions...)...)
 	if err != nil {
 		return nil, invalid("%s: %v", address, err)
 	}

@@ -48,11 +48,11 @@ func (c Credentials) dialOptions(address string) ([]grpc.DialOption, error) {
 		return metadata.AppendToOutgoingContext(ctx, "authorization", "Bearer "+c.Token)
 	}
 	return append(options,
-		grpc.WithUnaryInterceptor(func(ctx context.Context, method string, request, reply any,
+		grpc.WithChainUnaryInterceptor(func(ctx context.Context, method string, request, reply any,
 			connection *grpc.ClientConn, call grpc.UnaryInvoker, options ...grpc.CallOption) error {
 			return call(with(ctx), method, request, reply, connection, options...)
 		}),
-		grpc.WithStreamInterceptor(func(ctx context.Context, about *grpc.StreamDesc, connection *grpc.ClientConn,
+		grpc.WithChainStreamInterceptor(func(ctx context.Context, about *grpc.StreamDesc, connection *grpc.ClientConn,
 			method string, open grpc.Streamer, options ...grpc.CallOption) (grpc.ClientStream, error) {
 			return open(with(ctx), about, connection, method, options...)
 		})), nil

@@ -3,6 +3,8 @@ package stellate
 import (
 	"time"
 
+	"google.golang.org/grpc"
+
 	pb "stellate/proto/v1"
 )
 
@@ -17,6 +19,9 @@ type Connection struct {
 	Reconnect time.Duration
 	// OnOutage is called when the server is lost and when it is back. Default: the log package.
 	OnOutage func(string)
+	// DialOptions are gRPC's, beside our own: grpc.WithStatsHandler(otelgrpc.NewClientHandler()) has the
+	// spans of a server go on in the trace that the context is at.
+	DialOptions []grpc.DialOption
 }
 
 // Options are all that is asked of a mesh beside its oracle and epsilon; nil asks for nothing. Zero

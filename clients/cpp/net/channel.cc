@@ -18,32 +18,34 @@
 namespace stellate::client {
 namespace {
 
-// gRPC's own call credentials are refused on plain text even within one machine.
-class SendToken final : public grpc::experimental::Interceptor {
+using Headers = std::vector<std::pair<std::string, std::string>>;
+
+// Of every call. gRPC's own call credentials are refused on plain text even within one machine.
+class SendHeaders final : public grpc::experimental::Interceptor {
  public:
-  explicit SendToken(const std::string& header) : header_(header) {}
+  explicit SendHeaders(const Headers& headers) : headers_(headers) {}
   void Intercept(grpc::experimental::InterceptorBatchMethods* methods) override {
     if (methods->QueryInterceptionHookPoint(
             grpc::experimental::InterceptionHookPoints::PRE_SEND_INITIAL_METADATA)) {
-      methods->GetSendInitialMetadata()->emplace("authorization", header_);
+      methods->GetSendInitialMetadata()->insert(headers_.begin(), headers_.end());
     }
     methods->Proceed();
   }
 
  private:
-  const std::string& header_;
+  const Headers& headers_;
 };
 
-class SendTokenFactory final : public grpc::experimental::ClientInterceptorFactoryInterface {
+class SendHeadersFactory final : public grpc::experimental::ClientInterceptorFactoryInterface {
  public:
-  explicit SendTokenFactory(const std::string& token) : header_("Bearer " + token) {}
+  explicit SendHeadersFactory(Headers headers) : headers_(std::move(headers)) {}
   grpc::experimental::Interceptor* CreateClientInterceptor(
       grpc::experimental::ClientRpcInfo*) override {
-    return new SendToken(header_);
+    return new SendHeaders(headers_);
   }
 
  private:
-  const std::string header_;
+  const Headers headers_;
 };
 
 }  // namespace
@@ -85,17 +87,10 @@ Expected<std::shared_ptr<grpc::ChannelCredentials>> Security(const Credentials& 
   return grpc::SslCredentials(options);
 }
 
-constexpr int Milliseconds(double seconds) { return static_cast<int>(1000 * seconds); }
-
-}  // namespace
-
-const std::chrono::milliseconds kCallTime{Milliseconds(reconnect::kCall)};
-
-Expected<std::shared_ptr<grpc::Channel>> Connect(const Connection& connection) {
+// The token and the trace. kRefused for what gRPC would end the program for.
+Expected<Headers> HeadersOf(const Connection& connection) {
   const Credentials& credentials = connection.credentials;
-  const auto security = Security(credentials);
-  if (!security) return tl::unexpected(security.error());
-  std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> interceptors;
+  Headers headers;
   if (!credentials.token.empty()) {
     const bool plain =
         !credentials.tls && credentials.tls_ca.empty() && credentials.tls_certificate.empty();
@@ -104,8 +99,33 @@ Expected<std::shared_ptr<grpc::Channel>> Connect(const Connection& connection) {
                   "the token would go to " + connection.server +
                       " in plain text, for others to read and use: turn TLS on");
     }
-    interceptors.push_back(std::make_unique<SendTokenFactory>(credentials.token));
+    headers.emplace_back("authorization", "Bearer " + credentials.token);
   }
+  const auto& [traceparent, tracestate] = connection.trace;
+  for (const auto& [name, value] :
+       {std::pair("traceparent", traceparent), std::pair("tracestate", tracestate)}) {
+    if (value.empty()) continue;
+    if (std::any_of(value.begin(), value.end(), [](char c) { return c < ' ' || c > '~'; }))
+      return Fail(ErrorCode::kRefused, std::string(name) + " has to be printable ASCII");
+    headers.emplace_back(name, value);
+  }
+  return headers;
+}
+
+constexpr int Milliseconds(double seconds) { return static_cast<int>(1000 * seconds); }
+
+}  // namespace
+
+const std::chrono::milliseconds kCallTime{Milliseconds(reconnect::kCall)};
+
+Expected<std::shared_ptr<grpc::Channel>> Connect(const Connection& connection) {
+  const auto security = Security(connection.credentials);
+  if (!security) return tl::unexpected(security.error());
+  Expected<Headers> headers = HeadersOf(connection);
+  if (!headers) return tl::unexpected(headers.error());
+  std::vector<std::unique_ptr<grpc::experimental::ClientInterceptorFactoryInterface>> interceptors;
+  if (!headers->empty())
+    interceptors.push_back(std::make_unique<SendHeadersFactory>(*std::move(headers)));
   KeepGrpc();
   grpc::ChannelArguments arguments;
   // Streams are quiet while the other side computes: pings find a peer that froze or vanished.

@@ -36,12 +36,17 @@ export function channelCredentials(
   return grpc.credentials.createInsecure();
 }
 
-/** Sends the token with every call; call credentials would be refused on plain text. */
-export function tokenInterceptor(token: string): grpc.Interceptor {
+/** None where there is no token. */
+export function tokenHeader({ token }: Credentials): Record<string, string> {
+  return token === undefined ? {} : { authorization: `Bearer ${token}` };
+}
+
+/** Sends headers with every call, asked for each: of credentials gRPC would refuse them on plain text. */
+export function headersInterceptor(headers: () => Record<string, string>): grpc.Interceptor {
   return (options, nextCall) =>
     new grpc.InterceptingCall(nextCall(options), {
       start(metadata, listener, next) {
-        metadata.set("authorization", `Bearer ${token}`);
+        for (const [name, value] of Object.entries(headers())) metadata.set(name, value);
         next(metadata, listener);
       },
     });

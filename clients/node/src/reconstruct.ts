@@ -22,11 +22,12 @@ export async function reconstruct(
   options: ReconstructOptions & { requireCertified?: boolean; save?: string },
 ): Promise<Mesh> {
   const { requireCertified, save, onProgress, signal, ...rest } = options;
-  const { server, credentials, reconnectSeconds, keepaliveSeconds, onOutage, ...asked } = rest;
+  const { server, credentials, reconnectSeconds, keepaliveSeconds, onOutage, headers, ...asked } =
+    rest;
   const checked = new CheckedPoints(points, asked);
   if (save !== undefined) checkSave(save, asked.dimension, asked.ambientDimension);
   signal?.throwIfAborted();
-  const link = { server, credentials, reconnectSeconds, keepaliveSeconds, onOutage };
+  const link = { server, credentials, reconnectSeconds, keepaliveSeconds, onOutage, headers };
   const [client, close] = await connect(link);
   try {
     const info = await client.declarePoints(checked);

@@ -48,7 +48,7 @@ export interface RunOptions
 
 /** A client, and what has to be closed after it. */
 export async function connect(options: Connection): Promise<[Client, () => Promise<void>]> {
-  const { server, credentials, reconnectSeconds, keepaliveSeconds, onOutage } = options;
+  const { server, credentials, reconnectSeconds, keepaliveSeconds, onOutage, headers } = options;
   if (server instanceof Client) {
     if (credentials) throw new InvalidArgument("a Client has its credentials already");
     return [server, async () => {}];
@@ -57,7 +57,7 @@ export async function connect(options: Connection): Promise<[Client, () => Promi
   const at = server ?? (await Server.start());
   const stop = async () => (server ? undefined : (at as Server).close());
   try {
-    const given = { credentials, reconnectSeconds, keepaliveSeconds, onOutage };
+    const given = { credentials, reconnectSeconds, keepaliveSeconds, onOutage, headers };
     const client = new Client(at, given);
     return [client, () => (client.close(), stop())];
   } catch (error) {
@@ -269,7 +269,7 @@ export function judged(mesh: Mesh, { state, report }: MeshInfo): Mesh {
 async function* run(oracle: Oracle, options: RunOptions, every: boolean): AsyncGenerator<Mesh> {
   const { workers = 1, onProgress, signal, maxChunk, server, epsilon: wanted, ...more } = options;
   const { checkpoint, onEpsilon, ...rest } = more;
-  const { credentials, reconnectSeconds, keepaliveSeconds, onOutage, ...others } = rest;
+  const { credentials, reconnectSeconds, keepaliveSeconds, onOutage, headers, ...others } = rest;
   if (!Number.isInteger(workers) || workers < 1) {
     throw new InvalidArgument(`workers has to be a whole number from 1 on, and is ${workers}`);
   }
@@ -281,7 +281,7 @@ async function* run(oracle: Oracle, options: RunOptions, every: boolean): AsyncG
     );
   }
   const own = await kept?.server();
-  const link = { credentials, reconnectSeconds, keepaliveSeconds, onOutage };
+  const link = { credentials, reconnectSeconds, keepaliveSeconds, onOutage, headers };
   const [client, close] = await connect({ server: own ?? server, ...link });
   const serving = { workers, onProgress, signal, maxChunk, checkpoint };
   let coarse: Mesh | undefined;

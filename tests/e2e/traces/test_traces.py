@@ -100,6 +100,22 @@ def test_the_trace_of_a_program_goes_on_through_its_mesh(told, collector):
     ] == "stellated"
 
 
+def test_a_trace_goes_on_in_c_plus_plus(told, collector):
+    """stellate::Connection::trace, which the command line fills in."""
+    parent = f"00-{'4b' * 16}-{'a2' * 8}-01"
+    program = [stellate.viewer.find_stellate(), "mesh", "sphere:2", "-e", "0.3", "-q"]
+    subprocess.run(
+        [*program, "--server", told.address],
+        env={**os.environ, "TRACEPARENT": parent, "TRACESTATE": "theirs=1"},
+        check=True,
+    )
+    assert told.stop() == 0
+    (whole,) = collector.named("mesh")
+    assert whole.trace_id.hex() == "4b" * 16 and whole.parent_span_id.hex() == "a2" * 8
+    assert whole.trace_state == "theirs=1"
+    assert [w.parent_span_id.hex() for w in collector.named("worker")] == ["a2" * 8]
+
+
 def test_without_a_trace_a_mesh_begins_one_that_has_its_name(told, collector):
     with stellate.Client(told.address) as client:
         name = client.create(manifolds.Sphere(), 0.3).name

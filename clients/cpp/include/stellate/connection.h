@@ -19,6 +19,12 @@ struct Credentials {
   std::string token;                     // over plain text only within this machine
 };
 
+// The span that meshes are part of, in the traces of a server that has some: W3C's two
+// headers, as OpenTelemetry's propagator fills them in (docs/running/traces.md). Empty: none.
+struct TraceContext {
+  std::string traceparent, tracestate;
+};
+
 // A server that went away: restarted, frozen, or cut off.
 struct Outage {
   bool over = false;    // it is back, and the mesh goes on
@@ -43,6 +49,7 @@ struct Connection {
   // A server that is silent for so long is pinged, and lost if it does not answer in twice that
   // time.
   Seconds keepalive{4};
+  TraceContext trace = {};  // sent with every call
 };
 
 }  // namespace stellate
