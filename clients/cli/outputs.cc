@@ -7,10 +7,10 @@ namespace stellate::cli {
 CLI::Option* Outputs::AddTo(CLI::App* command) {
   return command->add_option(
       "-o,--output", paths_,
-      "file to write, .txt .off .obj .ply .stl .3mf .glb .msh .vtu .npz; may be given again. Large "
-      "meshes go into it as they come, in little memory; held whole are those in .stl .3mf .glb "
-      ".npz and into pipes, the surfaces of solids in .off .ply, and a boundary alone in .obj .msh "
-      ".vtu");
+      "file to write, .txt .off .obj .ply .stl .3mf .glb .msh .vtu .npz .nas; may be given again. "
+      "Large meshes go into it as they come, in little memory; held whole are those in .stl .3mf "
+      ".glb .npz .nas and into pipes, the surfaces of solids in .off .ply, and a boundary alone in "
+      ".obj .msh .vtu");
 }
 
 Expected<void> Outputs::Check(int dimension, int ambient_dimension) const {

@@ -88,11 +88,14 @@ Expected<Draft> WriteVtuPiece(Draft draft, FileShape shape, const Eigen::MatrixX
 std::string VtuIndex(const FileShape& shape, const std::vector<std::string>& sources);
 
 // Whole files, binary, little endian. kFileFailed for a mesh that is too fine for single precision,
-// which .stl and .glb have, and of the latter two for one without triangles.
+// which .stl and .glb have, and of .3mf and .glb for one without triangles.
 Expected<std::string> Npz(const Mesh& mesh);
 Expected<std::string> Stl(const Mesh& mesh);
 Expected<std::string> ThreeMf(const Mesh& mesh);
 Expected<std::string> Glb(const Mesh& mesh);
+// Nastran's bulk data, text: rods, triangles or tetrahedra; regions are their properties.
+// kFileFailed for a mesh whose numbers take more than eight digits.
+Expected<std::string> Nastran(const Mesh& mesh);
 
 // The first three coordinates of each point, zeros added.
 Eigen::MatrixXd InSpace(const Eigen::Ref<const Eigen::MatrixXd>& points);

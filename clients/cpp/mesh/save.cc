@@ -56,6 +56,12 @@ constexpr FileFormat kFormats[] = {
     {".msh", 1, 3, 3, "simplices of dimension 3 at most", Holds::kGroups, client::Msh},
     {".vtu", 1, 3, kAny, "simplices of dimension 3 at most", Holds::kGroups, nullptr},
     {".npz", 0, kAny, kAny, "anything", Holds::kRows, nullptr, false, client::Npz},
+    {".nas", 1, 3, 3, "simplices of dimension 3 at most", Holds::kGroups, nullptr, false,
+     client::Nastran},
+    {".bdf", 1, 3, 3, "simplices of dimension 3 at most", Holds::kGroups, nullptr, false,
+     client::Nastran},
+    {".fem", 1, 3, 3, "simplices of dimension 3 at most", Holds::kGroups, nullptr, false,
+     client::Nastran},
 };
 
 constexpr const char* kPieces = "; .pvtu is written by stellate-mpi, a piece a rank";

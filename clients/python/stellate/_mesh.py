@@ -303,8 +303,9 @@ class Mesh:
               point data "coordinates". Its field data are "epsilon", "certified" (0 or 1),
               "verdict" and "version" (UTF-8 bytes), and "groups": the groups' names, a line each.
         .nas, .bdf, .fem  k, d <= 3: Nastran bulk data, without faces; regions are properties.
+        .su2  k = d, 2 or 3: SU2's, markers by the walls' names.
         .vtk, as .vtu, and .avs .cgns .dat .dato .e .exo .f3grid .h5m .hmf .inp .mdpa .med .mesh
-        .meshb .post .su2 .tec .vol .xdmf .xmf .xml, d <= 3, by meshio. Of a mesh
+        .meshb .post .tec .vol .xdmf .xmf .xml, d <= 3, by meshio. Of a mesh
         with boundary part.xdmf has a part_facets.xdmf beside it, as FEniCS reads them: cells with
         "region", facets with "wall", a wall's number plus 1; of two coordinates where d = 2.
 

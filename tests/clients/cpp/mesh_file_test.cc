@@ -7,6 +7,7 @@
 #include <unistd.h>
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cstdint>
 #include <cstdlib>
 #include <cstring>
@@ -490,6 +491,31 @@ TEST_F(MeshFile, PartsHaveTrianglesAndNamesThatXmlAndJsonTake) {
   mesh.simplices.resize(3, 0);
   for (const std::string ending : {".3mf", ".glb"})
     EXPECT_NE(Refusal(mesh, "b" + ending).find("no triangle, and " + ending), std::string::npos);
+}
+
+TEST_F(MeshFile, NastranHasAsManyDigitsAsFit) {
+  Mesh mesh = Surface(3);
+  mesh.points.resize(3, 4);
+  mesh.points << -0.17355349564702321, -1.2345678901234567e-12, 1e22, 0.0001,  //
+      1e-300, -1e6 / 3, -5e-324, 1e15,                                         //
+      1.0, -0.0, 123456789.123456789, 1e16;
+  mesh.labels = {1, 2, 2, 1};
+  mesh.simplices.col(0) << 1, 2, 3;
+  const std::string text = Saved(mesh, "a.nas");
+  EXPECT_EQ(text.substr(0, text.find("CTRIA3")),
+            "BEGIN BULK\n"
+            "GRID*                  1                -1.7355349565E-11.000000000E-300*\n"
+            "*                    1.0\n"
+            "GRID*                  2                -1.234567890E-12-3.3333333333E+5*\n"
+            "*                   -0.0\n"
+            "GRID*                  3                1.0000000000E+22-4.94065646E-324*\n"
+            "*       1.23456789123E+8\n"
+            "GRID*                  4                          0.00011.0000000000E+15*\n"
+            "*       1.0000000000E+16\n");
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 1 + 8 + 4 + 1);
+  EXPECT_EQ(Saved(mesh, "a.bdf"), text);
+  EXPECT_EQ(Saved(mesh, "a.fem"), text);
+  EXPECT_NE(Refusal(Surface(4), "b.nas").find(".nas holds points of space"), std::string::npos);
 }
 
 TEST_F(MeshFile, NpzHoldsNamesOfAnyCharacters) {

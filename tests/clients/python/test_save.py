@@ -174,7 +174,12 @@ def test_off_of_any_dimension(tmp_path):
         (shapes.simplex_boundary(4), "m.vtu", "dimension 4"),
         (shapes.simplex_boundary(4), "m.msh", "dimension 3 at most.*known for it: .txt .npz$"),
         (shapes.polygon(5), "m.stl", "surfaces"),
-        (shapes.polygon(5), "m.su2", "solids"),
+        (shapes.polygon(5), "m.su2", "plane and solids"),
+        (
+            shapes.torus(),
+            "m.su2",
+            "holds domains of the plane and solids of space, .* R\\^3; known .*.vtu",
+        ),
         (shapes.torus(), "m.wkt", "no format"),
         (shapes.torus(), "m.pvtu", "known for this mesh: .*; .pvtu is written by stellate-mpi"),
         (shapes.torus(), "m.docx", r"\.docx.*known for this mesh: .*\.vtu"),
@@ -216,7 +221,7 @@ def test_what_is_written_is_read_back(ending, mesh, tmp_path):
         return  # meshio reads no curves there; see test_curve_as_obj_and_ply
     else:
         again = meshio.read(path, "gmsh" if ending == ".msh" else None)
-        assert len(again.cells) == 1
+        assert len(again.cells) == 1 + (ending == ".su2")  # which has the boundary, too
         cells = again.cells[0].data
     if ending == ".stl":  # meshio joins the corners again, in an order of its own
         order = [int(np.abs(space - p).sum(axis=1).argmin()) for p in again.points]
@@ -411,3 +416,34 @@ def test_orienting_takes_linear_time(rng):
         few = steps_to_orient(renumbered(small, rng))
         many = steps_to_orient(renumbered(large, rng))
         assert many < 2 * few  # for 64 times the vertices: with their logarithm, not with a root
+
+
+SQUARE = stellate.Mesh(
+    np.array([[0, 0], [1 / 3, 0], [1 / 3, 1], [0, 1.0]]),
+    np.array([[0, 1, 2], [0, 2, 3]]),
+    walls=np.array([0b11, 0b110, 0b1100, 0b1001], dtype=np.uint64),
+)
+
+
+def test_su2_has_the_boundary_as_markers(tmp_path):
+    SQUARE.save(tmp_path / "m.su2")
+    again = meshio.read(tmp_path / "m.su2")
+    assert np.array_equal(again.points, SQUARE.points)
+    assert np.array_equal(again.cells[0].data, SQUARE.oriented_simplices())
+    text = (tmp_path / "m.su2").read_text()
+    assert text.startswith("NDIME= 2\nNELEM= 2\n5 0 1 2\n5 0 2 3\nNPOIN= 4\n0.0 0.0\n0.33")
+    tags = ["wall_0", "wall_1", "wall_2", "wall_3"]
+    assert [line.split()[1] for line in text.splitlines() if "TAG" in line] == tags
+    assert "MARKER_TAG= wall_1\nMARKER_ELEMS= 1\n3 0 1\n" in text
+    bare = dataclasses.replace(SQUARE, walls=None)
+    bare.save(tmp_path / "bare.su2")
+    end = (tmp_path / "bare.su2").read_text().partition("NMARK= 1\n")[2].splitlines()
+    assert end[:2] == ["MARKER_TAG= boundary", "MARKER_ELEMS= 4"] and len(end) == 6
+
+
+def test_su2_has_no_markers_between_regions(tmp_path):
+    walls = np.array([0b10011, 0b110, 0b11100, 0b1001], dtype=np.uint64)
+    halves = dataclasses.replace(SQUARE, walls=walls, labels=np.array([1, 2], dtype=np.int8))
+    halves.save(tmp_path / "m.su2")
+    text = (tmp_path / "m.su2").read_text()
+    assert "wall_4" not in text and text.count("MARKER_TAG") == 4

@@ -1,4 +1,4 @@
-"""Files that are written whole, .npz .3mf .glb: both languages' say the same of the same mesh."""
+"""Files that are written whole, .npz .3mf .glb .nas: both languages' say the same of the same mesh."""
 
 import collections
 import json
@@ -93,7 +93,7 @@ def as_drawn(path):
 
 @pytest.mark.parametrize("name", MESHES)
 def test_both_languages_write_the_same(name, server, tmp_path):
-    files = {ending: tmp_path / f"cpp.{ending}" for ending in ("npz", "3mf", "glb", "txt")}
+    files = {ending: tmp_path / f"cpp.{ending}" for ending in ("npz", "3mf", "glb", "nas", "txt")}
     report = by_command_line(server, MESHES[name], *files.values())
     mesh = mesh_of(files["npz"])
     exact = stellate.load_txt(files["txt"])
@@ -113,6 +113,9 @@ def test_both_languages_write_the_same(name, server, tmp_path):
             assert mine == theirs
         else:
             assert np.allclose(mine, theirs, rtol=0, atol=1e-6)
+
+    mesh.save(tmp_path / "python.nas")
+    assert files["nas"].read_bytes() == (tmp_path / "python.nas").read_bytes()
 
     with np.load(files["npz"]) as mine, np.load(tmp_path / "python.npz") as theirs:
         assert set(mine) - set(theirs) == {"certified", "verdict", "epsilon"}

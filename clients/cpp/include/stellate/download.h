@@ -52,10 +52,10 @@ struct SavedMesh {
 // As DownloadMesh and Mesh::Save to each path, byte for byte, in little memory however large the
 // mesh is: parts go into the files as they come, which take their places when they are whole. Still
 // held whole are a mesh that is not over or that no server could orient, and what a format needs
-// whole: .stl, .3mf, .glb and .npz; .off and .ply of solids; .msh, .vtu and .obj of a boundary
-// alone; pipes. Of a manifold with boundary these three are written from a file without a name
-// beside them, as large as they are, and its simplices at walls are held. An error leaves no file
-// behind.
+// whole: .stl, .3mf, .glb, .npz and .nas; .off and .ply of solids; .msh, .vtu and .obj of a
+// boundary alone; pipes. Of a manifold with boundary these three are written from a file without a
+// name beside them, as large as they are, and its simplices at walls are held. An error leaves no
+// file behind.
 Expected<SavedMesh> DownloadMeshTo(const std::string& name, const std::vector<std::string>& paths,
                                    const DownloadOptions& options);
 

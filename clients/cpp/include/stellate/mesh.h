@@ -91,6 +91,7 @@ struct Mesh {
   //   .npz  any k and d, exact, for numpy.load: arrays "points" (n, d), "simplices" (m, k+1), and
   //         where there are some "walls" (n,), "labels" (m,), "region_names"; of the boundary alone
   //         "labels" (m, 2), its sides; of a mesh that is over "certified", "verdict", "epsilon"
+  //   .nas, .bdf, .fem  k, d <= 3: Nastran bulk data, text, without faces; regions are properties
   // Of a mesh with boundary .msh, .vtu and .obj have its faces too, of all dimensions, after its
   // simplices: in .msh as physical groups "inside", or where there are several regions by the
   // region's name, "region_1" for label 1 if it has none, "wall_0", ..., "walls_0_1", ...; in .obj

@@ -14,7 +14,7 @@ import numpy as np
 
 from .._complex import Complex
 from ..errors import SaveError
-from . import glb, layouts, meshio_formats, nastran, npz, three_mf
+from . import glb, layouts, meshio_formats, nastran, npz, su2, three_mf
 from .groups import Group, groups
 from .ply import PlyWriter
 from .spool import Spool
@@ -179,8 +179,11 @@ class _Format:
     contents: Callable[[Complex], bytes] | None = None
     meshio: meshio_formats.MeshioFormat | None = None
     surface_of_solids: bool = False  # in space, besides what it holds
+    fills_space: bool = False  # k = d alone
 
     def takes(self, k: int, d: int) -> bool:
+        if self.fills_space and k != d:
+            return False
         return (self.surface_of_solids and k == d == 3) or (
             self.least_dimension <= k <= self.largest_dimension
             and d <= self.largest_ambient_dimension
@@ -268,7 +271,7 @@ def _choose(path: str, k: int, d: int) -> _Format:
             f"no format is known by the ending {ending!r} of {path}; known for this mesh: {known}{pieces}"
         )
     if not form.takes(k, d):
-        fits = form.least_dimension <= k <= form.largest_dimension
+        fits = form.least_dimension <= k <= form.largest_dimension and not form.fills_space
         raise SaveError(
             f"{ending} holds {'points of space' if fits else form.words}, and {path} would get a "
             f"mesh of dimension {k} in R^{d}; known for it: {known}"
@@ -323,6 +326,10 @@ def _nastran(mesh: Complex) -> bytes:
     return nastran.contents(mesh, cells(mesh))
 
 
+def _su2(mesh: Complex) -> bytes:
+    return su2.contents(mesh, cells(mesh))
+
+
 _LOW = "curves and surfaces"
 _SOLIDS = "and the surfaces of solids in space"
 _CELLULAR = "simplices of dimension 3 at most"
@@ -348,6 +355,9 @@ _FORMATS = {
         ending: _Format(1, 3, 3, _CELLULAR, contents=_nastran)
         for ending in (".bdf", ".fem", ".nas")
     },
+    ".su2": _Format(
+        2, 3, 3, "domains of the plane and solids of space", contents=_su2, fills_space=True
+    ),
     **{
         ending: _Format(
             form.least_dimension,

@@ -57,7 +57,6 @@ FORMATS = {
     ".mesh": MeshioFormat("medit"),
     ".meshb": MeshioFormat("medit"),
     ".post": MeshioFormat("permas"),
-    ".su2": MeshioFormat("su2", least_dimension=3),
     ".tec": MeshioFormat("tecplot"),
     ".vol": MeshioFormat("netgen"),
     ".xml": MeshioFormat("dolfin-xml", least_dimension=2),
