@@ -26,6 +26,18 @@ if TYPE_CHECKING:
     from .oracles import PeriodicMesh
 
 
+# What others call the parts of a mesh.
+_CALLED_HERE = {
+    **dict.fromkeys(("vertices", "verts", "nodes", "coordinates", "vectors"), "points"),
+    **dict.fromkeys(("triangles", "tetrahedra", "cells", "elements", "connectivity"), "simplices"),
+    **dict.fromkeys(("n_points", "n_vertices"), "len(mesh.points)"),
+    **dict.fromkeys(("n_cells", "n_faces"), "len(mesh.simplices)"),
+    **dict.fromkeys(("write", "export", "to_stl"), "save(path)"),
+    "is_watertight": "certified",
+    "euler_number": "euler",
+}
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class Mesh:
     """A simplicial k-complex in R^d.
@@ -70,6 +82,13 @@ class Mesh:
     name: str = ""
     coordinate_names: tuple[str, ...] = ()
     scale: tuple[float, ...] = ()
+
+    if not TYPE_CHECKING:  # which is to find misspelt names
+
+        def __getattr__(self, name: str) -> Any:
+            here = _CALLED_HERE.get(name)
+            hint = "" if here is None else f": here it is `{here}`"
+            raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}{hint}")
 
     def region(self, label: int | str) -> Mesh:
         """The part with one label, or with that name, of the same points. Its boundary is where it ends

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from typing import Any
 
 import numpy as np
@@ -36,6 +37,10 @@ def as_points(points: Any, what: str) -> Array:
 
     Raises: InvalidArgument.
     """
+    if isinstance(points, (str, os.PathLike)):
+        raise InvalidArgument(
+            f"{what} have to be an array (n, d), and are the name of a file: read it first, as by np.loadtxt"
+        )
     try:
         array = np.array(unmasked(points), dtype=np.float64)
     except (TypeError, ValueError):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numbers
+import os
 from typing import Any, Literal, Union
 
 import numpy as np
@@ -108,6 +109,12 @@ def _set(message: Any, name: str, value: Any) -> None:
 
 
 def _array(values: Any, name: str, axes: int, shape: str) -> np.ndarray:
+    if isinstance(values, (str, os.PathLike)):
+        raise InvalidArgument(
+            f"{name} have to be numbers, {shape}, and are the name of a file, {os.fspath(values)!r}: read it "
+            "first, as by np.loadtxt; in the shell `stellate reconstruct FILE -k 2 -o mesh.vtu` reads .ply, "
+            ".npy, .csv, .xyz and .txt"
+        )
     try:
         array = np.asarray(unmasked(values))
         if array.dtype.kind not in "fiub":

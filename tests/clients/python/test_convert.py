@@ -1,8 +1,10 @@
 """Meshes in other programs' hands: meshio's plug-in, series for ParaView, tables in notebooks."""
 
+import copy
 import dataclasses
 import html.parser
 import importlib
+import pickle
 import subprocess
 import sys
 import xml.etree.ElementTree as ElementTree
@@ -200,3 +202,18 @@ def test_a_report_in_a_notebook_says_what_print_says(certified):
     for title, words in report.lines():
         assert title in text and words in text
     assert "<b>fine</b>" in shown(stellate.Mesh(np.eye(3), np.array([[0, 1]]), report))
+
+
+def test_what_others_call_the_parts_of_a_mesh_is_told():
+    mesh = shapes.torus()
+    for name, here in {
+        "vertices": "`points`",
+        "triangles": "`simplices`",
+        "export": "save",
+    }.items():
+        with pytest.raises(AttributeError, match=f"no attribute '{name}': here it is .*{here}"):
+            getattr(mesh, name)
+    with pytest.raises(AttributeError, match="no attribute 'colour'$"):
+        mesh.colour  # noqa: B018
+    again = copy.deepcopy(pickle.loads(pickle.dumps(mesh)))
+    assert np.array_equal(again.points, mesh.points) and not hasattr(mesh, "vertices")

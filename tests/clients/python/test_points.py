@@ -1,5 +1,6 @@
 """What stellate.reconstruct takes, and what it says of what it does not take; no server."""
 
+import pathlib
 import sys
 
 import numpy as np
@@ -105,3 +106,10 @@ def test_a_simplex_tree(monkeypatch):
     monkeypatch.setitem(sys.modules, "gudhi", None)
     with pytest.raises(ImportError, match="pip install gudhi"):
         mesh.simplex_tree()
+
+
+def test_the_name_of_a_file_is_no_points():
+    with pytest.raises(stellate.InvalidArgument, match="'scan.ply': read it first.*in the shell"):
+        stellate.reconstruct("scan.ply", 2)
+    with pytest.raises(stellate.InvalidArgument, match="name of a file: read it first"):
+        stellate.oracles.PointCloud(pathlib.Path("scan.xyz"), 2)

@@ -246,6 +246,8 @@ def test_an_intersection_needs_no_labels():
         (lambda: s.Ball(-1), "a length above 0"),
         (lambda: s.Ball(at=[[0, 0]]), "point of R"),
         (lambda: s.Box([0, 0], [1, 1, 1]), "2 numbers"),
+        (lambda: s.Box(0, [1, 1, 1]), "a point of R"),
+        (lambda: s.Ball().at(1, 2), "3 numbers"),
         (lambda: s.Box([0, 1], [1, 0]), "lower < upper"),
         (lambda: s.Cylinder(axis="w"), "'x', 'y', 'z'"),
         (lambda: s.Cylinder(axis=[0, 0, 0]), "other than 0"),
@@ -343,3 +345,16 @@ def test_materials_have_labels_by_their_names(rng):
     assert (composite.labels[signs @ (1 << np.arange(composite.walls))] == want).all()
     again = pickle.loads(pickle.dumps(composite))
     assert (again.labels == composite.labels).all()
+
+
+def test_cubes_and_places_may_be_said_as_on_the_command_line():
+    cube = s.Box(-1, 2).at(1, 0, 0)
+    where = np.array([[2.9, -0.9, 1.9], [-0.1, 0, 0], [1.0, 2.1, 0]])
+    assert cube.contains(where).tolist() == [True, False, False]
+    assert (
+        cube.contains(where).tolist()
+        == s.Box([-1] * 3, [2] * 3).at([1, 0, 0]).contains(where).tolist()
+    )
+    for other in (lambda: cube + s.Ball(), lambda: 2 * cube, lambda: cube * cube):
+        with pytest.raises(TypeError, match=r"joined by a \| b"):
+            other()

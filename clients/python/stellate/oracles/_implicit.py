@@ -74,7 +74,8 @@ class ImplicitManifold:
             lower, upper = (np.asarray(corner, dtype=float) for corner in bounding_box)
         except (TypeError, ValueError):
             raise InvalidArgument(
-                f"bounding_box has to be a pair of corners (lower, upper), and is {bounding_box!r}"
+                "bounding_box has to be a pair of corners (lower, upper), as ([-1, -1, -1], [1, 1, 1]), "
+                f"and is {bounding_box!r}"
             ) from None
         if lower.shape != (ambient_dimension,) or upper.shape != lower.shape:
             raise InvalidArgument(

@@ -33,9 +33,12 @@ class Ball(Solid):
 
 
 class Box(Solid):
-    """The box between two corners of R^d, any d: 2 d walls, the lower ones first."""
+    """The box between two corners of R^d, any d: 2 d walls, the lower ones first. Box(-1, 1) is the cube of
+    space between (-1, -1, -1) and (1, 1, 1)."""
 
     def __init__(self, lower: Any, upper: Any) -> None:
+        if np.ndim(lower) == 0 and np.ndim(upper) == 0:
+            lower, upper = [lower] * 3, [upper] * 3
         low = vector(lower, "the lower corner")
         high, d = vector(upper, "the upper corner", len(low)), len(low)
         if not (low < high).all():

@@ -112,6 +112,11 @@ class Solid(ByWalls):
     def __or__(self, other: Solid) -> Solid:
         return self._joined(other, lambda a, b: Either((a, b)))
 
+    def __add__(self, other: Any) -> Solid:
+        raise TypeError("solids are joined by a | b, cut by a & b, and a - b takes b away")
+
+    __mul__ = __rmul__ = __add__
+
     def __sub__(self, other: Solid) -> Solid:
         return self._joined(other, lambda a, b: All((a, Not(b))))
 
@@ -132,9 +137,9 @@ class Solid(ByWalls):
         tree = join(self._tree, other._tree)
         return Solid(tree, self.dimension, (*self._witnesses, *other._witnesses))
 
-    def at(self, point: Any) -> Solid:
-        """Moved by a vector (d,): what is about 0 comes to lie about the point."""
-        shift = vector(point, "the point", self.dimension)
+    def at(self, *point: Any) -> Solid:
+        """Moved by a vector (d,), or d numbers: what is about 0 comes to lie about the point."""
+        shift = vector(point[0] if len(point) == 1 else point, "the point", self.dimension)
         return self._moved(Motion(np.eye(self.dimension), 1.0, shift))
 
     def rotated(self, rotation: Any) -> Solid:
