@@ -55,6 +55,7 @@ def normals(mesh: Complex) -> np.ndarray:
             f"normals are of hypersurfaces: this mesh of dimension {mesh.dimension} in "
             f"R^{mesh.ambient_dimension} has a {mesh.ambient_dimension - mesh.dimension}-dimensional "
             "space of them at each point"
+            + ("; its boundary_mesh() has some" if mesh.dimension == mesh.ambient_dimension else "")
         )
     sides = _sides(mesh.points, _oriented(mesh))
     across = [(-1) ** i * np.linalg.det(np.delete(sides, i, axis=2)) for i in range(sides.shape[2])]
@@ -68,7 +69,7 @@ def enclosed_volume(mesh: Complex) -> float:
     if mesh.dimension != mesh.ambient_dimension - 1:
         raise InvalidArgument(
             f"hypersurfaces enclose volumes: this mesh has dimension {mesh.dimension} in "
-            f"R^{mesh.ambient_dimension}"
+            f"R^{mesh.ambient_dimension}, and a `volume` of its own"
         )
     if len(facets_in_one(mesh.simplices)):
         raise InvalidArgument("the mesh has a boundary, and encloses no volume")

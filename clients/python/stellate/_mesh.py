@@ -101,9 +101,11 @@ class Mesh:
                 known = list(self.region_names)
                 raise ValueError(f"the mesh has no one region named {label!r}; names: {known}")
             label = self.region_names.index(label) + 1
-        if self.labels is None or label == 0 or not (self.labels == label).any():
-            have = () if self.labels is None else np.unique(self.labels[self.labels > 0]).tolist()
-            raise ValueError(f"the mesh has no region {label!r}; it has {list(have)}")
+        if self.labels is None:
+            raise ValueError(f"the mesh is all one, without regions, and has no region {label!r}")
+        if label == 0 or not (self.labels == label).any():
+            have = np.unique(self.labels[self.labels > 0]).tolist()
+            raise ValueError(f"the mesh has no region {label!r}; it has {have}")
         if self.is_boundary:
             on = (self.labels == label).any(axis=1)
             sides = self.labels[on]

@@ -217,3 +217,13 @@ def test_what_others_call_the_parts_of_a_mesh_is_told():
         mesh.colour  # noqa: B018
     again = copy.deepcopy(pickle.loads(pickle.dumps(mesh)))
     assert np.array_equal(again.points, mesh.points) and not hasattr(mesh, "vertices")
+
+
+def test_what_a_solid_has_in_place_of_what_surfaces_have_is_told():
+    solid = stellate.Mesh(np.eye(4)[:, :3], np.array([[0, 1, 2, 3]]))
+    with pytest.raises(stellate.InvalidArgument, match="a `volume` of its own"):
+        solid.enclosed_volume  # noqa: B018
+    with pytest.raises(stellate.InvalidArgument, match=r"its boundary_mesh\(\) has some"):
+        solid.normals()
+    with pytest.raises(ValueError, match="all one, without regions, and has no region 1"):
+        solid.region(1)

@@ -178,6 +178,10 @@ WRONG = {
     "orthonormal": lambda: oracles.Transformed(TORUS, rotation=2 * np.eye(3)),
     "shape": lambda: oracles.Transformed(TORUS, rotation=np.eye(2)),
     "scale": lambda: oracles.Transformed(TORUS, scale=0),
+    "one number, and is .*Axes of different units": lambda: oracles.Transformed(
+        TORUS, scale=[1, 2, 3]
+    ),
+    "and then of the joints that are fixed": lambda: oracles.Linkage(GROUND, FOUR_BARS),
     "a level set on _Bare needs": lambda: oracles.LevelSet(_Bare(), lambda x: x[:, 0]),
     "leave none": lambda: oracles.LevelSet(TORUS, lambda x: x[:, :2]),
     "no set of level 0.*; give level=, between them, such as": lambda: (
@@ -330,3 +334,15 @@ def test_faces_are_found_in_any_unit(unit, rng):
     x = unit * rng.normal(size=(100, 3))
     expected = unit * x / np.linalg.norm(x, axis=1)[:, None]
     assert np.abs(ball.face_point(x, (0,)) - expected).max() <= 1e-9 * unit
+
+
+def test_one_wall_needs_no_list():
+    def above(x):
+        return x[:, 2]
+
+    def sphere(x):
+        return (x * x).sum(axis=1) - 1
+
+    equation = {"ambient_dimension": 3, "dimension": 2, "bounding_box": ([-2] * 3, [2] * 3)}
+    assert oracles.Clipped(TORUS, above).walls == 1
+    assert oracles.ImplicitManifold(sphere, inequalities=above, **equation).walls == 1

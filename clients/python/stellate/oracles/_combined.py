@@ -121,6 +121,11 @@ class Transformed:
             raise InvalidArgument(
                 f"translation has to be {len(turn)} finite numbers: {translation}"
             )
+        if np.ndim(scale):
+            raise InvalidArgument(
+                f"scale has to be one number, and is {scale!r}: of a similarity. Axes of different units have "
+                "stellate.mesh(oracle, epsilon, scale=)"
+            )
         if not (np.isfinite(scale) and scale > 0):
             raise InvalidArgument(f"scale has to be positive, and is {scale!r}")
         self._turn, self._scale, self._shift = turn, float(scale), shift

@@ -102,6 +102,8 @@ class ImplicitManifold:
         self._equations = Equations(f, jacobian, shape, self._scale, box, max_iterations, seeds)
         self._nearest = Nearest(self._equations)
         self._doubts = Doubts(self._equations, lower, upper)
+        if callable(inequalities):
+            inequalities = [inequalities]
         if len(inequalities) > 0:
             self._bound(inequalities, library)
 

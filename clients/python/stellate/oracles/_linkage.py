@@ -27,6 +27,11 @@ class Linkage(ImplicitManifold):
     def __init__(
         self, bars: Sequence[tuple[Any, Any, float]], fixed: Mapping[Any, Sequence[float]]
     ) -> None:
+        if not isinstance(fixed, Mapping) or isinstance(bars, Mapping):
+            raise InvalidArgument(
+                "a linkage is of bars, (joint, joint, length) each, and then of the joints that are fixed, by "
+                'name: Linkage([("a", "b", 1.0), ...], {"a": (0, 0), ...})'
+            )
         if not bars or not fixed:
             raise InvalidArgument("a linkage needs bars, and one joint at least that is fixed")
         places = {name: np.array(place, dtype=np.float64) for name, place in fixed.items()}

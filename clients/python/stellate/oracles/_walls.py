@@ -105,7 +105,7 @@ class Clipped:
     def __init__(
         self,
         oracle: Any,
-        walls: Sequence[Wall] = (),
+        walls: Sequence[Wall] | Wall = (),
         *,
         gradients: Sequence[Wall | Library | None] | Library | None = None,
         box: Sequence[Any] | None = None,
@@ -114,6 +114,8 @@ class Clipped:
         labels: Any = None,
         closures: Sequence[Sequence[int]] = (),
     ) -> None:
+        if callable(walls):
+            walls = [walls]
         self._walls: list[UserFunction] = []
         self._gradients: list[UserFunction | None] = []
         self.labels = None if labels is None else np.array(labels)
