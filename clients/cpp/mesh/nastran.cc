@@ -12,8 +12,8 @@
 namespace stellate::client {
 namespace {
 
-constexpr std::size_t kWidth = 16;     // of a number, in a card with wide fields
-constexpr int kMost = 100'000'000 - 1;  // a field of eight columns
+constexpr std::size_t kWidth = 16;                // of a number, in a card with wide fields
+constexpr int kMost = 100'000'000 - 1;            // a field of eight columns
 constexpr int kLeastFixed = -4, kMostFixed = 15;  // powers of ten that need no exponent
 
 struct Decimal {
@@ -37,7 +37,8 @@ Decimal DecimalOf(double value, Precision... precision) {
 
 std::string Fixed(const Decimal& decimal) {
   const auto& [digits, exponent] = decimal;
-  if (exponent < 0) return "0." + std::string(static_cast<std::size_t>(-exponent - 1), '0') + digits;
+  if (exponent < 0)
+    return "0." + std::string(static_cast<std::size_t>(-exponent - 1), '0') + digits;
   const auto whole = static_cast<std::size_t>(exponent) + 1;
   if (digits.size() <= whole) return digits + std::string(whole - digits.size(), '0') + ".0";
   return digits.substr(0, whole) + "." + digits.substr(whole);
