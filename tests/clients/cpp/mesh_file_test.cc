@@ -9,74 +9,20 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cstdint>
-#include <cstdlib>
 #include <cstring>
 #include <filesystem>
 #include <fstream>
 #include <iterator>
-#include <map>
 #include <sstream>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
-#include "mesh/groups.h"
-#include "mesh/piece.h"
 #include "mesh/write_file.h"
-#include "mesh/zip.h"
+#include "mesh_file_fixture.h"
 #include "stellate/mesh.h"
 
 namespace stellate {
 namespace {
-
-class MeshFile : public ::testing::Test {
- protected:
-  void SetUp() override {
-    const ::testing::TestInfo* info = ::testing::UnitTest::GetInstance()->current_test_info();
-    directory_ = std::filesystem::temp_directory_path() /
-                 ("stellate-mesh-file-" + std::to_string(getpid()) + "-" + info->name());
-    std::filesystem::create_directories(directory_);
-  }
-  void TearDown() override { std::filesystem::remove_all(directory_); }
-
-  std::string Path(const std::string& name) const { return (directory_ / name).string(); }
-  std::string Saved(const Mesh& mesh, const std::string& name) {
-    const Expected<void> saved = mesh.Save(Path(name));
-    EXPECT_TRUE(saved.has_value()) << saved.error().message;
-    std::ifstream file(Path(name), std::ios::binary);
-    return {std::istreambuf_iterator<char>(file), std::istreambuf_iterator<char>()};
-  }
-  std::string Refusal(const Mesh& mesh, const std::string& name) {
-    const Expected<void> saved = mesh.Save(Path(name));
-    EXPECT_FALSE(saved.has_value());
-    EXPECT_FALSE(std::filesystem::exists(Path(name)));
-    if (saved) return "";
-    EXPECT_EQ(saved.error().code, ErrorCode::kFileFailed);
-    return saved.error().message;
-  }
-
-  std::filesystem::path directory_;
-};
-
-// The exit status of a line of Python with that argument.
-int InPython(const std::string& line, const std::string& argument) {
-  const std::string command =
-      "/usr/bin/python3 -B -c \"import sys; " + line + "\" '" + argument + "'";
-  const int status = std::system(command.c_str());
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-}
-
-// A tetrahedron's boundary in R^d, with numbers that do not fit into few digits.
-Mesh Surface(int d) {
-  Mesh mesh;
-  mesh.points = Eigen::MatrixXd::Zero(d, 4);
-  mesh.points(0, 1) = 1.0 / 3;
-  mesh.points(1, 2) = -1e-300;
-  mesh.points(d - 1, 3) = 12345678.9;
-  mesh.simplices.resize(3, 4);
-  mesh.simplices << 0, 0, 0, 1, 1, 1, 2, 2, 2, 3, 3, 3;
-  return mesh;
-}
 
 TEST_F(MeshFile, TxtHoldsEveryDigit) {
   EXPECT_EQ(Saved(Surface(3), "a.txt"),
@@ -102,19 +48,6 @@ TEST_F(MeshFile, OffKeepsAllCoordinates) {
   const std::string three = Saved(Surface(3), "a.off"), five = Saved(Surface(5), "b.off");
   EXPECT_EQ(three.rfind("OFF\n4 4 0\n", 0), 0u) << three;
   EXPECT_EQ(five.rfind("nOFF\n5\n4 4 0\n0 0 0 0 0\n", 0), 0u) << five;
-}
-
-// The faces of an oriented closed surface pass each edge once in each direction.
-void ExpectEdgesCancel(const std::vector<std::vector<int>>& faces) {
-  std::map<std::pair<int, int>, int> passed;
-  for (const std::vector<int>& face : faces) {
-    ASSERT_EQ(face.size(), 3u);
-    for (size_t i = 0; i < 3; ++i) ++passed[{face[i], face[(i + 1) % 3]}];
-  }
-  for (const auto& [edge, count] : passed) {
-    EXPECT_EQ(count, 1);
-    EXPECT_EQ((passed.count({edge.second, edge.first})), 1u);
-  }
 }
 
 std::vector<std::vector<int>> LinesAfter(const std::string& text, const std::string& prefix) {
@@ -180,152 +113,8 @@ TEST_F(MeshFile, PlyHoldsFaces) {
   ExpectEdgesCancel(faces);
 }
 
-// The byte count and the bytes of a VTU data array that is inline, from base64.
-std::string InlineBytes(const std::string& xml, size_t array) {
-  const size_t start = xml.find('>', array) + 1;
-  std::string bytes;
-  std::uint32_t bits = 0;
-  int held = 0;
-  for (const char c : xml.substr(start, xml.find('<', start) - start)) {
-    if (c == '=') break;
-    const int digit = c >= 'a'   ? c - 'a' + 26
-                      : c >= 'A' ? c - 'A'
-                      : c == '+' ? 62
-                      : c == '/' ? 63
-                                 : c - '0' + 52;
-    bits = bits << 6 | static_cast<std::uint32_t>(digit);
-    held += 6;
-    if (held >= 8) {
-      held -= 8;
-      bytes += static_cast<char>(bits >> held & 0xff);
-    }
-  }
-  return bytes;
-}
-
-// The same, raw, of one that is among the appended data, with what follows it.
-std::string AppendedBytes(const std::string& xml, const std::string& tag, size_t unit) {
-  const size_t data = xml.find('_', xml.find("<AppendedData encoding=\"raw\">")) + 1;
-  const std::string offset = "offset=\"";
-  const size_t place = std::stoul(tag.substr(tag.find(offset) + offset.size()));
-  EXPECT_EQ((data + place) % unit, 0u) << "can be mapped into memory: " << tag;
-  return xml.substr(data + place);
-}
-
-// The numbers of a VTU data array.
-template <typename Number>
-std::vector<Number> VtuNumbers(const std::string& xml, const std::string& name) {
-  const size_t array = xml.find("Name=\"" + name + "\"");
-  EXPECT_NE(array, std::string::npos) << name;
-  if (array == std::string::npos) return {};
-  const std::string tag = xml.substr(array, xml.find('>', array) - array);
-  const std::string bytes = tag.find("\"appended\"") == std::string::npos
-                                ? InlineBytes(xml, array)
-                                : AppendedBytes(xml, tag, sizeof(Number));
-  std::uint64_t size = 0;
-  std::memcpy(&size, bytes.data(), sizeof size);
-  EXPECT_GE(bytes.size(), sizeof size + size);
-  std::vector<Number> numbers(size / sizeof(Number));
-  std::memcpy(numbers.data(), bytes.data() + sizeof size, size);
-  return numbers;
-}
-
-TEST_F(MeshFile, VtuHoldsPointsAndCells) {
-  const Mesh mesh = Surface(3);
-  const std::string xml = Saved(mesh, "a.vtu");
-  EXPECT_NE(xml.find("NumberOfPoints=\"4\" NumberOfCells=\"4\""), std::string::npos);
-  const std::vector<double> points = VtuNumbers<double>(xml, "Points");
-  EXPECT_EQ(points, std::vector<double>(mesh.points.data(), mesh.points.data() + 12));
-  const auto ids = VtuNumbers<std::int64_t>(xml, "connectivity");
-  ASSERT_EQ(ids.size(), 12u);
-  std::vector<std::vector<int>> faces;
-  for (size_t i = 0; i < 12; i += 3) {
-    faces.push_back(
-        {static_cast<int>(ids[i]), static_cast<int>(ids[i + 1]), static_cast<int>(ids[i + 2])});
-  }
-  ExpectEdgesCancel(faces);
-  EXPECT_EQ(VtuNumbers<std::int64_t>(xml, "offsets"), (std::vector<std::int64_t>{3, 6, 9, 12}));
-  EXPECT_EQ(VtuNumbers<std::uint8_t>(xml, "types"), (std::vector<std::uint8_t>{5, 5, 5, 5}));
-  EXPECT_EQ(xml.find("coordinates"), std::string::npos);
-}
-
-TEST_F(MeshFile, VtuSaysWhatTheMeshIs) {
-  Mesh mesh = Surface(3);
-  EXPECT_EQ(Saved(mesh, "a.vtu").find("\"epsilon\""), std::string::npos);
-  mesh.report.termination = Termination::kVertexBudget;
-  mesh.report.epsilon = 0.1;
-  mesh.report.certificate.verdict = "not certified: max_vertices is spent";
-  const std::string xml = Saved(mesh, "a.vtu");
-  EXPECT_EQ(VtuNumbers<double>(xml, "epsilon"), std::vector<double>{0.1});
-  EXPECT_EQ(VtuNumbers<std::uint8_t>(xml, "certified"), std::vector<std::uint8_t>{0});
-  const auto verdict = VtuNumbers<char>(xml, "verdict");
-  EXPECT_EQ(std::string(verdict.begin(), verdict.end()), mesh.report.certificate.verdict);
-  const auto version = VtuNumbers<char>(xml, "version");
-  EXPECT_EQ(std::string(version.begin(), version.begin() + 9), "stellate ");
-}
-
-TEST_F(MeshFile, VtuKeepsHighCoordinatesAsData) {
-  const Mesh mesh = Surface(6);
-  const std::string xml = Saved(mesh, "a.vtu");
-  EXPECT_EQ(VtuNumbers<double>(xml, "coordinates"),
-            std::vector<double>(mesh.points.data(), mesh.points.data() + 24));
-  EXPECT_EQ(VtuNumbers<double>(xml, "Points").size(), 12u);
-}
-
 // A tetrahedron cut at a point within: three of the four are turned inside out by ascending
 // numbers.
-TEST_F(MeshFile, PvtuIsOfManyProcesses) {
-  EXPECT_NE(Refusal(Surface(3), "a.pvtu").find("stellate-mpi"), std::string::npos);
-}
-
-TEST_F(MeshFile, APieceHasTheSimplicesOfItsVerticesAndTheirPoints) {
-  const Mesh mesh = Surface(4);
-  const auto groups = client::GroupsOf(mesh);
-  // The simplex 1 2 3; of no other is one of them the lowest vertex.
-  Expected<client::Draft> piece = client::WritePiece(*client::Draft::Begin(Path("a.vtu")), mesh,
-                                                     groups, {false, true, false, true});
-  ASSERT_TRUE(piece.has_value()) << piece.error().message;
-  EXPECT_FALSE(std::filesystem::exists(Path("a.vtu")));
-  ASSERT_TRUE(piece->Finish().has_value());
-  EXPECT_EQ(InPython("import meshio; m = meshio.read(sys.argv[1]); d = m.point_data; "
-                     "assert d['GlobalPointIds'].ravel().tolist() == [1, 2, 3]; "
-                     "assert d['coordinates'][2].tolist() == [0, 0, 0, 12345678.9]; "
-                     "assert len(m.cells) == 1; "
-                     "assert sorted(m.cells[0].data[0].tolist()) == [0, 1, 2]",
-                     Path("a.vtu")),
-            0);
-}
-
-TEST_F(MeshFile, APointWithoutSimplicesIsInThePieceOfItsOwner) {
-  Mesh mesh = Surface(3);
-  mesh.simplices = mesh.simplices.leftCols(1).eval();  // 0 1 2
-  const auto groups = client::GroupsOf(mesh);
-  for (const bool has_alone : {true, false}) {
-    Expected<client::Draft> piece = client::WritePiece(*client::Draft::Begin(Path("a.vtu")), mesh,
-                                                       groups, {true, false, false, has_alone});
-    ASSERT_TRUE(piece.has_value() && piece->Finish().has_value());
-    EXPECT_EQ(InPython("import meshio; d = meshio.read(sys.argv[1]).point_data; "
-                       "assert d['GlobalPointIds'].ravel().tolist() == " +
-                           std::string(has_alone ? "[0, 1, 2, 3]" : "[0, 1, 2]"),
-                       Path("a.vtu")),
-              0);
-  }
-}
-
-TEST_F(MeshFile, AnIndexNamesPiecesBesideIt) {
-  const client::PiecePaths paths(Path("a&b.pvtu"));
-  EXPECT_EQ(paths.Piece(2), Path("a&b/a&b_2.vtu"));
-  const Mesh mesh = Surface(3);
-  const std::string index = paths.IndexOf(mesh, client::GroupsOf(mesh), 2);
-  EXPECT_NE(index.find("<Piece Source=\"a&amp;b/a&amp;b_1.vtu\"/>"), std::string::npos);
-  EXPECT_NE(index.find("<PPointData GlobalIds=\"GlobalPointIds\">"), std::string::npos);
-  EXPECT_TRUE(paths.Check(2, 3, 0).has_value());
-  EXPECT_FALSE(paths.Check(4, 5, 0).has_value());
-  std::filesystem::create_directories(paths.Piece(1));
-  EXPECT_TRUE(paths.Check(2, 3, 0).has_value());
-  EXPECT_FALSE(paths.Check(2, 3, 1).has_value());
-}
-
 TEST_F(MeshFile, ASolidIsItsSurfaceInFormatsOfTriangles) {
   Mesh solid;
   solid.points.resize(3, 5);
@@ -401,57 +190,6 @@ TEST_F(MeshFile, MshIsGmshs) {
             "4 2 2 1 1 2 4 3\n$EndElements\n");
 }
 
-// Two tetrahedra, above and below a triangle of wall 1; all else is on wall 0.
-TEST(Regions, AreGroupsAndWhatLiesBetweenIsAFaceTurnedOutOfTheLowerLabel) {
-  Mesh mesh;
-  mesh.points.resize(3, 5);
-  mesh.points << 0, 1, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 1, -1;
-  mesh.simplices.resize(4, 2);
-  mesh.simplices << 0, 0, 1, 1, 2, 2, 3, 4;
-  mesh.walls = {3, 3, 3, 1, 1};
-  for (const bool below_is_first : {true, false}) {
-    mesh.labels =
-        below_is_first ? std::vector<std::uint8_t>{7, 2} : std::vector<std::uint8_t>{2, 7};
-    const std::vector<client::Group> groups = client::GroupsOf(mesh);
-    ASSERT_GE(groups.size(), 4u);
-    EXPECT_EQ(groups[0].name, "region_2");
-    EXPECT_EQ(groups[1].name, "region_7");
-    EXPECT_EQ(groups[0].simplices.cols(), 1);
-    EXPECT_EQ(groups[0].simplices.col(0).maxCoeff(), below_is_first ? 4u : 3u);
-    EXPECT_EQ(groups[2].name, "wall_0");
-    EXPECT_EQ(groups[2].simplices.cols(), 6);
-    EXPECT_EQ(groups[3].name, "walls_0_1");
-    const SimplexMatrix& between = groups[3].simplices;
-    ASSERT_EQ(between.cols(), 1);
-    const Eigen::Vector3d a = mesh.points.col(between(0, 0)), b = mesh.points.col(between(1, 0)),
-                          c = mesh.points.col(between(2, 0));
-    EXPECT_EQ((b - a).cross(c - a)[2] > 0, below_is_first);
-    EXPECT_EQ(mesh.boundary().size(), 1u);
-    EXPECT_EQ(mesh.faces(2).size(), 2u);
-    const Mesh region = mesh.Region(7);
-    EXPECT_EQ(region.simplices.cols(), 1);
-    EXPECT_EQ(region.boundary().size(), 2u);
-  }
-  try {
-    mesh.Region(1);
-    ADD_FAILURE() << "there is no region 1";
-  } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "the mesh has no region 1; it has [2, 7]");
-  }
-  mesh.labels = {2, 7};
-  mesh.region_names = {"", "soft \"matrix\"", "", "", "", "", "grain"};
-  EXPECT_EQ(client::GroupsOf(mesh)[0].name, "soft__matrix_");
-  EXPECT_EQ(client::GroupsOf(mesh)[1].name, "grain");
-  EXPECT_EQ(client::GroupsOf(mesh)[3].sides, (std::vector<Sides>{{2, 7}}));
-  EXPECT_EQ(client::GroupsOf(mesh)[1].label, 7);
-  mesh.region_names[1] = "grain";  // not to be told apart
-  EXPECT_EQ(client::GroupsOf(mesh)[0].name, "region_2");
-  mesh.region_names.clear();
-  mesh.labels = {4, 4};  // one region: the inside
-  EXPECT_EQ(client::GroupsOf(mesh)[0].name, "inside");
-  EXPECT_EQ(mesh.faces(2).size(), 1u);
-}
-
 TEST_F(MeshFile, StlHoldsTrianglesWithNormalsOutwards) {
   Mesh mesh = Surface(3);
   mesh.points.setZero();
@@ -518,44 +256,6 @@ TEST_F(MeshFile, NastranHasAsManyDigitsAsFit) {
   EXPECT_NE(Refusal(Surface(4), "b.nas").find(".nas holds points of space"), std::string::npos);
 }
 
-TEST_F(MeshFile, NpzHoldsNamesOfAnyCharacters) {
-  Mesh mesh = Surface(3);
-  mesh.labels = {1, 2, 1, 2};
-  mesh.region_names = {"\xc3\xa9t\xc3\xa9", "", "\xff"};  // the last is no UTF-8
-  Saved(mesh, "a.npz");
-  EXPECT_EQ(
-      InPython("import numpy; a = numpy.load(sys.argv[1]); names = a['region_names'].tolist(); "
-               "sys.exit(names != ['\\xe9t\\xe9', '', '\\ufffd'] or a['labels'].tolist() != [1, 2, "
-               "1, 2])",
-               Path("a.npz")),
-      0);
-}
-
-TEST_F(MeshFile, AnotherProgramReadsZipFilesOfBothKinds) {
-  for (const std::uint64_t largest : {0xFFFFFFFEull, 200ull, 0ull}) {
-    client::Zip zip(largest);
-    std::string noise;
-    std::uint64_t state = 1;
-    for (int i = 0; i < 100'000; ++i)
-      noise += static_cast<char>((state *= 6364136223846793005u) >> 60);
-    zip.Add("empty", "");
-    zip.Add("small", "abc");
-    zip.Add("noise", noise);
-    zip.Add("zeros", std::string(300'000, '\0'));
-    zip.Add("last", "z");
-    ASSERT_TRUE(client::WriteFile(Path("a.zip"), zip.Finish()).has_value());
-    std::ofstream(Path("noise"), std::ios::binary) << noise;
-    EXPECT_EQ(
-        InPython("import zipfile; z = zipfile.ZipFile(sys.argv[1]); "
-                 "noise = open(sys.argv[1][:-5] + 'noise', 'rb').read(); "
-                 "wanted = [b'', b'abc', noise, bytes(300000), b'z']; "
-                 "sys.exit(z.testzip() is not None or [z.read(n) for n in z.namelist()] != wanted)",
-                 Path("a.zip")),
-        0)
-        << largest;
-  }
-}
-
 TEST_F(MeshFile, AFileIsReplacedWholeOrNotAtAll) {
   std::ofstream(Path("real.txt")) << "old";
   std::filesystem::permissions(Path("real.txt"), std::filesystem::perms::owner_all);
@@ -602,33 +302,6 @@ TEST_F(MeshFile, AProcessThatIsKilledLeavesNothing) {
 
 TEST_F(MeshFile, SaysWhyAFileCannotBeWritten) {
   EXPECT_NE(Refusal(Surface(3), "missing/a.txt").find("No such file"), std::string::npos);
-}
-
-TEST(OrientedSimplices, LeavesAOneSidedSurfaceAlone) {
-  SimplexMatrix plane(3, 10);             // the six-vertex projective plane
-  plane << 0, 0, 0, 0, 0, 1, 1, 1, 2, 2,  //
-      1, 1, 2, 3, 4, 2, 3, 4, 3, 3,       //
-      2, 3, 4, 5, 5, 5, 4, 5, 4, 5;
-  EXPECT_EQ(OrientedSimplices(plane), plane);
-}
-
-TEST(OrientedSimplices, LeavesABranchingComplexAlone) {
-  SimplexMatrix book(3, 3);  // three pages on one edge
-  book << 0, 0, 0, 1, 1, 1, 2, 3, 4;
-  EXPECT_EQ(OrientedSimplices(book), book);
-}
-
-TEST(OrientedSimplices, OrientsThreeSpheres) {
-  // The boundary of the 4-simplex: signs must alternate with the vertex left out.
-  SimplexMatrix sphere(4, 5);
-  for (int drop = 0; drop < 5; ++drop) {
-    for (int i = 0; i < 4; ++i) sphere(i, drop) = static_cast<std::uint32_t>(i < drop ? i : i + 1);
-  }
-  const SimplexMatrix oriented = OrientedSimplices(sphere);
-  for (int j = 0; j < 5; ++j) {
-    const bool swapped = oriented(2, j) > oriented(3, j);
-    EXPECT_EQ(swapped, j % 2 == 1) << j;
-  }
 }
 
 }  // namespace
