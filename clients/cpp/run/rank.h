@@ -15,8 +15,11 @@ struct Singular {
 };
 
 // Follows the least singular value of the equations' Jacobian down along M, from where it is
-// smallest, which only the client can do. Nothing: they keep their rank, or there are none. Throws
-// what the oracle throws.
+// smallest. Nothing: they keep their rank, or there are none. Throws what the oracle throws.
+//
+// The server never sees equations, so that clients have this each: Python's is _rank.py. Both take
+// their constants from clients/shared/equations.toml, and their tests' cases from singular.json
+// there.
 std::optional<Singular> FindSingular(Oracle& oracle, std::uint64_t random_seed);
 
 }  // namespace stellate::client

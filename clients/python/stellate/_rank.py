@@ -1,4 +1,8 @@
-"""Whether the equations that M is given by are of full rank on all of it, which only we can ask."""
+"""Whether the equations that M is given by are of full rank on all of it.
+
+The server never sees equations, so that clients have this each: C++'s is clients/cpp/run/rank.cc. Both take
+their constants from clients/shared/equations.toml, and their tests' cases from singular.json there.
+"""
 
 from __future__ import annotations
 

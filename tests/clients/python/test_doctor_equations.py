@@ -1,4 +1,7 @@
-"""stellate.check where equations lose rank: crossings, tips, bars on one line."""
+"""stellate.check where equations lose rank: tips, bars on one line.
+
+Other equations: test_rank_shared.py.
+"""
 
 import numpy as np
 import pytest
@@ -26,15 +29,6 @@ def beyond(least):
 
 
 CROSSINGS = {
-    "two cylinders of one radius": (
-        stellate.ImplicitManifold(
-            lambda x: np.stack([x[:, 0] ** 2 + x[:, i] ** 2 - 1 for i in (1, 2)], axis=1),
-            ambient_dimension=3,
-            dimension=1,
-            bounding_box=([-1.5] * 3, [1.5] * 3),
-        ),
-        lambda p: abs(abs(p[0]) - 1) + abs(p[1]) + abs(p[2]),
-    ),
     "a rhombus of bars, on one line": (
         oracles.Linkage(
             [("a", "p", 1.0), ("p", "q", 1.0), ("q", "b", 1.0)], {"a": (0, 0), "b": (1, 0)}
@@ -57,18 +51,13 @@ def test_where_equations_lose_rank_is_told(name):
 @pytest.mark.parametrize(
     "oracle",
     [
-        manifolds.ellipsoid((1, 1, 30)),
         manifolds.tanglecube(),
-        equation(lambda x: 1e-9 * ((x * x).sum(axis=1) - 1)),
-        equation(  # a neck of .03 in place of the tip
-            lambda x: (x * x).sum(axis=1) ** 2 - x[:, 0] ** 2 + x[:, 1] ** 2 + x[:, 2] ** 2 - 1e-3
-        ),
         oracles.Linkage(
             [("a", "p", 1.0), ("p", "q", 1.01), ("q", "b", 1.0)], {"a": (0, 0), "b": (1, 0)}
         ),
         beyond(0.2),
     ],
-    ids=["needle", "tanglecube", "small values", "neck", "nearly a rhombus", "a tip cut out"],
+    ids=["tanglecube", "nearly a rhombus", "a tip cut out"],
 )
 def test_steep_and_flat_equations_are_not_called_singular(oracle):
     assert "SINGULAR" not in stellate.check(oracle).codes
