@@ -24,7 +24,7 @@ struct Decimal {
 // The magnitude, in as few digits as tell it, or in `precision` of them behind the first.
 template <typename... Precision>
 Decimal DecimalOf(double value, Precision... precision) {
-  std::array<char, 40> text;
+  std::array<char, 40> text{};  // atoi stops at a zero behind the number
   const auto end = std::to_chars(text.data(), text.data() + text.size(), std::abs(value),
                                  std::chars_format::scientific, precision...)
                        .ptr;
