@@ -72,6 +72,10 @@ inline void Put(const std::vector<std::uint8_t>& some, Eigen::Index first,
 
 // Queries of one kind. Column j is query j. The memory order is the wire's: points are n x d and
 // bases n x d x k in C order, so that conversion is a copy.
+//
+//   QueryBlock block;  // the points of M nearest to two points of space, and tangent bases there
+//   block.points = (Eigen::MatrixXd(3, 2) << 2, 0, 0, 3, 0, 0).finished();
+//   block.want.tangents = true;
 struct QueryBlock {
   QueryKind kind = QueryKind::kClosestPoint;
   Eigen::MatrixXd points;  // d x n: x, or the flat's point c
@@ -118,7 +122,14 @@ struct QueryBatch {
   }
 };
 
-// The answers to a block, or to a contiguous part of it. Column j is the answer to query j.
+// The answers to a block, or to a contiguous part of it. Column j is the answer to query j. Answer
+// a block so, of the unit sphere for instance, and check it before you pass it on:
+//
+//   AnswerBlock answer = AnswerBlock::Shape(spec.dimension, spec.walls, block, block.size());
+//   answer.points = block.points.colwise().normalized();
+//   const Status status = CheckAnswers(spec, block, 0, answer);
+//
+// It is no error if there is no point, as within a radius: set the query's `found` to 0.
 struct AnswerBlock {
   Eigen::MatrixXd points;           // d x n; ignored where not found
   std::vector<std::uint8_t> found;  // n, 1 or 0; empty: all found
@@ -159,6 +170,7 @@ struct AnswerBlock {
   bool Fits(const AnswerBlock& shape) const;
 };
 
+// The answers to a batch.
 struct Answers {
   std::vector<AnswerBlock> blocks;  // one for each block of the batch, in its order
 };

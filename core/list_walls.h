@@ -7,7 +7,9 @@
 
 namespace stellate::core {
 
-// Writes "0, 2, 5".
+// Writes the walls of a set for people, ascending.
+//
+//   ListWalls(SetOfWall(0) | SetOfWall(2));  // "0, 2"
 inline std::string ListWalls(WallSet walls) {
   std::string names;
   ForEachWall(walls, [&](int wall) { names += Message(names.empty() ? "" : ", ", wall); });

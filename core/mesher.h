@@ -16,11 +16,14 @@ namespace stellate::core {
 // The epsilon-refinement of Chapter 5 as a state machine. It never calls an oracle: it gives the
 // queries of one round and takes their answers.
 //
-//   auto mesher = Mesher::Create(spec);
-//   while (const auto batch = (*mesher)->NextBatch()) {
-//     auto delta = (*mesher)->Absorb(answers_of(*batch));
+//   const Expected<std::unique_ptr<Mesher>> made = Mesher::Create(spec);
+//   if (!made) return made.error();
+//   Mesher& mesher = **made;
+//   while (const auto batch = mesher.NextBatch()) {
+//     const Expected<MeshDelta> delta = mesher.Absorb(AnswersTo(*batch));
+//     if (!delta) mesher.Fail(delta.error());
 //   }
-//   const Report& report = (*mesher)->report();
+//   if (mesher.report().certificate.certified) Use(mesher.Points(), mesher.Simplices());
 //
 // Deterministic: the specification and the answers determine the mesh bit for bit, for any
 // Execution. One thread at a time may use a Mesher, except that any thread may call Interrupt;
@@ -50,7 +53,8 @@ class Mesher {
   // only be cancelled. Any thread may call this at any time.
   virtual void Interrupt() = 0;
 
-  // End the run now and keep the mesh as it is. No effect once it is over.
+  // End the run now and keep the mesh as it is: as cancelled, or as failed for this reason, which
+  // the report holds. No effect once it is over.
   virtual void Cancel() = 0;
   virtual void Fail(Status reason) = 0;
 

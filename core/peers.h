@@ -8,14 +8,21 @@
 namespace stellate::core {
 
 // The parts that make one mesh together, in one process or in many. All functions wait for the
-// other parts: all parts make the same calls in the same order.
+// other parts: all parts make the same calls in the same order, and so none inside a parallel
+// loop.
+//
+//   const std::vector<Peers::Bytes> all = peers.ToAll(message);  // all[peers.part()] is our own
+//   const Peers::Sums sums = peers.Sum(own.size());
+//   const std::uint64_t first = sums.before;  // our things are numbered from this on
+//
+// core/base/parcel.h packs numbers into bytes.
 class Peers {
  public:
   using Bytes = std::vector<std::byte>;
 
   virtual ~Peers() = default;
 
-  // From 0 to parts() - 1.
+  // This part's number, from 0 to parts() - 1; and how many parts there are.
   virtual int part() const = 0;
   virtual int parts() const = 0;
 
@@ -34,7 +41,7 @@ class Peers {
   virtual Sums Sum(std::uint64_t count) const = 0;
 };
 
-// The only part, of a whole mesh.
+// The only part, of a whole mesh: it waits for nothing.
 class Alone final : public Peers {
  public:
   int part() const override { return 0; }
@@ -43,7 +50,7 @@ class Alone final : public Peers {
   Sums Sum(std::uint64_t count) const override { return {count, 0}; }
 };
 
-// Of a mesh that is made in one part.
+// Returns the peers of a mesh that is made in one part; good for the life of the program.
 inline const Peers& NoPeers() {
   static const Alone alone;
   return alone;

@@ -5,6 +5,9 @@
 namespace stellate::core {
 
 // What became of a point. The numbers are on the wire, and never change.
+//
+//   for (const Place place : result->places)
+//     if (place == Place::kNoise) std::cerr << PlaceName(place) << ": " << PlaceAdvice(place);
 enum class Place : std::uint8_t {
   kOk = 0,        // its star was right as it was built
   kMerged = 1,    // equals an earlier point, which stands for it; in no simplex

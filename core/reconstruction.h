@@ -31,6 +31,7 @@ enum class Weighting {
 //
 //   ReconstructionSpecification spec;
 //   spec.dimension = 2, spec.ambient_dimension = 3;
+//   spec.closed = false;  // M may end
 struct ReconstructionSpecification {
   int dimension = 0;          // k, 1 to kMaxReconstructionDimension
   int ambient_dimension = 0;  // d, k < d
@@ -111,7 +112,12 @@ struct ReconstructionProgress {
 };
 
 // Watches and interrupts a reconstruction in another thread. Any thread may call Interrupt and
-// progress at any time.
+// progress at any time. Use one for one reconstruction; it must outlive that.
+//
+//   ReconstructionWatch watch;
+//   std::thread reconstructing([&] { result = Reconstruct(spec, {points, {}}, {}, &watch); });
+//   watch.Interrupt();
+//   reconstructing.join();  // soon
 class ReconstructionWatch {
  public:
   // Makes Reconstruct return soon with kCancelled, for good.

@@ -28,6 +28,9 @@ enum class Phase { kSeeding = 0, kRefining, kCertifying, kDone };
 const char* PhaseName(Phase p);  // "SEEDING", ...
 
 // The state of a running mesh, cheap to read. It is final after the last round.
+//
+//   const Progress& now = mesher->progress();
+//   std::cerr << PhaseName(now.phase) << ": " << 100 * now.fraction << " %\n";
 struct Progress {
   Phase phase = Phase::kSeeding;
   std::uint64_t round = 0;    // batches absorbed
@@ -48,6 +51,11 @@ struct Progress {
 // contains a simplex if the star of its lowest vertex does; once all stars are consistent that is
 // the union of the stars. For k >= 4 the last delta may replace the few simplices about which stars
 // still disagree (core/complex/cavities.h).
+//
+// Take what is removed out before you put in what is added:
+//
+//   for (const auto& ids : TrianglesOf(delta.removed)) triangles.erase(ids);
+//   for (const auto& ids : TrianglesOf(delta.added)) triangles.insert(ids);
 struct MeshDelta {
   std::uint64_t revision = 0;                 // 1, 2, ...: one a round
   std::uint64_t first_vertex = 0;             // id of the first new vertex
@@ -62,6 +70,7 @@ struct MeshDelta {
 // M without labels; where M does not fill space (k < d), those of its wall's positive and negative
 // side.
 
+// What a run took.
 struct Counts {
   std::uint64_t vertices = 0, simplices = 0;
   std::uint64_t rounds = 0;                 // batches asked, certificate included
@@ -168,7 +177,9 @@ struct ProtectionReport {
   bool is_delaunay = false;
 };
 
-// The certificate, computed from the finished complex; nothing in it is assumed.
+// The certificate, computed from the finished complex; nothing in it is assumed. Ask `certified`
+// first; if it is false, `verdict` says what is wrong and what to do, and `violations` where. All
+// other fields are measurements, set as far as the checks came.
 struct Certificate {
   bool certified = false;             // every claim below holds, and the run converged
   std::string verdict;                // plain words; the first thing wrong if not certified
@@ -234,6 +245,10 @@ struct Certificate {
   std::vector<std::int64_t> betti;
 };
 
+// How a run ended, and what is known of its mesh.
+//
+//   if (!report.failure.ok()) std::cerr << report.failure.message << '\n';
+//   if (!report.certificate.certified) std::cerr << report.certificate.verdict << '\n';
 struct Report {
   Termination termination = Termination::kRunning;
   Status failure;  // the reason when termination is kOracleFailed

@@ -114,6 +114,11 @@ struct Limits {
 //   Specification spec;
 //   spec.dimension = 2, spec.ambient_dimension = 3, spec.epsilon = 0.1;
 //   spec.seeds = points_near_m;  // 3 x m
+//   spec.criteria.max_deviation = 1e-3;  // finer where M bends
+//   if (const Status status = Validate(spec); !status.ok()) std::cerr << status.message << '\n';
+//
+// Lengths and coordinates are in one unit of the caller's choice. Set the two dimensions, epsilon,
+// and seeds or a box; all else has a default.
 struct Specification {
   int dimension = 0;          // k
   int ambient_dimension = 0;  // d, k < d

@@ -27,6 +27,9 @@ enum class StatusCode {
 
 // A refusal: the code for programs, the message for people. The message names the offending
 // value, where it was found, the rule that it broke and what to do.
+//
+//   const Status status = Validate(spec);
+//   if (!status.ok()) std::cerr << status.field << ": " << status.message << '\n';
 struct Status {
   StatusCode code = StatusCode::kOk;
   std::string message;
@@ -39,9 +42,19 @@ struct Status {
 // Stable upper-case name of a code, e.g. "ORACLE_NOT_FINITE". Programs may compare it.
 const char* StatusCodeName(StatusCode code);
 
+// A value, or the Status that says why there is none.
+//
+//   const Expected<int> half = Half(7);
+//   if (!half) std::cerr << StatusCodeName(half.error().code) << ": " << half.error().message;
 template <typename T>
 using Expected = tl::expected<T, Status>;
 
+// What a function of that type returns where it has no value. `field`: as in Status.
+//
+//   Expected<int> Half(int n) {
+//     if (n % 2 != 0) return Refuse(StatusCode::kInvalidArgument, Message(n, " is odd"), "n");
+//     return n / 2;
+//   }
 inline tl::unexpected<Status> Refuse(StatusCode code, std::string message, std::string field = "") {
   return tl::unexpected<Status>(Status{code, std::move(message), std::move(field)});
 }

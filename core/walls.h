@@ -11,6 +11,9 @@ namespace stellate::core {
 // The face M_I is the part of M where the walls of I are 0: M itself for no wall, a part of the
 // boundary for one, edges and corners for more. Its dimension is k - |I|. A WallSet is such a set
 // I, a bit for each wall.
+//
+//   const WallSet edge = SetOfWall(0) | SetOfWall(2);  // where walls 0 and 2 meet
+//   ForEachWall(edge, [&](int wall) { walls.push_back(wall); });
 using WallSet = std::uint64_t;
 
 inline constexpr int kMaxWalls = 64;

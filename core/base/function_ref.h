@@ -8,7 +8,11 @@ template <typename Signature>
 class FunctionRef;
 
 // A reference to a callable of any type, which must outlive it: the parameter of a function that is
-// compiled once.
+// compiled once, in its own source, and not for each body. Do not keep one: a lambda that was given
+// as an argument is gone when the call returns.
+//
+//   double SumOf(std::size_t count, FunctionRef<double(std::size_t)> term);
+//   SumOf(values.size(), [&](std::size_t i) { return values[i]; });
 template <typename Result, typename... Arguments>
 class FunctionRef<Result(Arguments...)> {
  public:

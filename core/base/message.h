@@ -8,9 +8,12 @@
 
 namespace stellate::core {
 
-// Joins text and numbers to one message: Message("epsilon is ", 0.1). Doubles are written with the
-// fewest digits that read back as the same value, so that a refused value can be found in the
-// caller's data.
+// Joins text and numbers to one message. Doubles are written with the fewest digits that read back
+// as the same value, so that a refused value can be found in the caller's data.
+//
+//   Message("epsilon is ", 0.1, ", not > ", 1);  // "epsilon is 0.1, not > 1"
+//
+// A part is anything that std::string_view takes, an integer or a floating point number; no bool.
 template <typename... Parts>
 std::string Message(const Parts&... parts) {
   std::string text;
@@ -34,7 +37,10 @@ std::string Message(const Parts&... parts) {
   return text;
 }
 
-// Writes a measured value for people: four digits.
+// Writes a measured value for people: four digits, no more than its error allows. Use it for what
+// was computed; a value that the caller gave is written whole, by Message.
+//
+//   Brief(2.0 / 3);  // "0.6667"
 inline std::string Brief(double value) {
   char digits[40];
   const auto end =

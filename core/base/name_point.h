@@ -8,7 +8,9 @@
 
 namespace stellate::core {
 
-// Writes the first coordinates of a point, as messages name it: "(0.5, 1, ...)".
+// Writes the first six coordinates of a point, as messages name it.
+//
+//   NamePoint(Eigen::Vector2d(0.5, 1));  // "(0.5, 1)"
 inline std::string NamePoint(const Eigen::VectorXd& x) {
   std::string name = "(";
   for (Eigen::Index i = 0; i < std::min<Eigen::Index>(x.size(), 6); ++i) {

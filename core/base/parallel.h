@@ -10,12 +10,18 @@
 
 namespace stellate::core {
 
-// Calls body(begin, end) for ranges that make up [0, count), in parallel and in no order. Compiled
-// once: one oneTBB loop for each body was a third of the core's code, and of its time to compile.
+// Calls body(begin, end) for ranges that make up [0, count), in parallel and in no order. Call
+// ParallelFor instead where a body takes one index; ranges depend on the number of threads.
+// Compiled once: one oneTBB loop for each body was a third of the core's code, and of its time to
+// compile.
 void ParallelRanges(std::size_t count, FunctionRef<void(std::size_t, std::size_t)> body);
 
 // Calls body(i) for each i in [0, count), in parallel and in no order. The bodies must not touch
 // each other's data; then results do not depend on the number of threads.
+//
+//   ParallelFor(norms.size(), [&](std::size_t i) { norms[i] = std::abs(values[i]); });
+//
+// It returns when all bodies have, and throws Interrupted if the run was interrupted meanwhile.
 //
 // oneTBB checks for interruption before each of its tasks, which may be thousands of bodies: too
 // rarely if a body takes long.
@@ -28,9 +34,9 @@ void ParallelFor(Index count, const Body& body) {
   ParallelRanges(static_cast<std::size_t>(std::max(count, Index{0})), range);
 }
 
-// Calls body(chunk, begin, end) for chunks whose borders depend only on `count`, so that results
-// gathered by chunk are the same for any number of threads. Chunks are large enough to share
-// working memory, and small enough for some dozens of threads.
+// The chunks of [0, count), as ParallelChunks visits them: items of each, and how many there are.
+// They depend only on `count`. Chunks are large enough to share working memory, and small enough
+// for some dozens of threads.
 inline std::size_t ChunkSize(std::size_t count) {
   return std::clamp<std::size_t>(count / 256, 1, 64);
 }
@@ -39,6 +45,13 @@ inline std::size_t ChunkCount(std::size_t count) {
   return (count + size - 1) / size;
 }
 
+// Calls body(chunk, begin, end) for each chunk, in parallel. Sums and lists that are gathered by
+// chunk, and then joined in the chunks' order, are the same for any number of threads.
+//
+//   std::vector<double> sums(ChunkCount(values.size()));
+//   ParallelChunks(values.size(), [&](std::size_t chunk, std::size_t begin, std::size_t end) {
+//     for (std::size_t i = begin; i < end; ++i) sums[chunk] += values[i];
+//   });
 template <typename Body>
 void ParallelChunks(std::size_t count, const Body& body) {
   const std::size_t size = ChunkSize(count);
@@ -47,7 +60,7 @@ void ParallelChunks(std::size_t count, const Body& body) {
   });
 }
 
-// Joins the results of parts, one after the other.
+// Joins the results of parts, one after the other, and frees each part as soon as it is copied.
 template <typename Item>
 std::vector<Item> Concatenate(std::vector<std::vector<Item>> parts) {
   std::vector<std::size_t> begins;
@@ -68,6 +81,10 @@ std::vector<Item> Concatenate(std::vector<std::vector<Item>> parts) {
 
 // Gathers what gather(i, &found) finds for each i in [0, count), in the order of i. Checks for
 // interruption once a chunk.
+//
+//   const auto negative = ParallelGather<double>(values.size(), [&](std::size_t i, auto* found) {
+//     if (values[i] < 0) found->push_back(values[i]);
+//   });
 template <typename Item, typename Gather>
 std::vector<Item> ParallelGather(std::size_t count, const Gather& gather) {
   std::vector<std::vector<Item>> parts(ChunkCount(count));

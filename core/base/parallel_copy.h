@@ -7,7 +7,9 @@
 
 namespace stellate::core {
 
-// Copies `count` numbers, in parallel if there are many.
+// Copies `count` numbers, in parallel if there are many. The two arrays must not overlap.
+//
+//   ParallelCopy(values.data(), values.size(), norms.data());
 template <typename Number>
 void ParallelCopy(const Number* from, std::size_t count, Number* to) {
   constexpr std::size_t kFew = 4096;

@@ -10,6 +10,8 @@ namespace stellate::core {
 
 // Returns those i in [0, count) that are kept, ascending: `keeps(i)` is called twice for each.
 // Where many are kept it is cheaper than ParallelGather.
+//
+//   ParallelSelect(values.size(), [&](std::size_t i) { return values[i] < 0; });
 template <typename Keeps>
 std::vector<std::uint32_t> ParallelSelect(std::size_t count, const Keeps& keeps) {
   std::vector<std::size_t> ends(ChunkCount(count));

@@ -8,7 +8,12 @@
 
 namespace stellate::core {
 
-// `less` is a strict total order: equal items would end up in any order. Blocks are sorted, and
+// Sorts items in place, in parallel if there are more than a thousand. `less` is a strict total
+// order: equal items would end up in any order.
+//
+//   ParallelSort(values, std::less<>());
+//
+// Blocks are sorted, and
 // merged in pairs: oneTBB's parallel_sort makes two loops of its own for each kind of item, several
 // times the code.
 template <typename Item, typename Less>

@@ -6,10 +6,18 @@
 
 namespace stellate::core {
 
-// Inner loops over ambient coordinates. Four running sums: the compiler vectorises them, and the
+// Inner loops over ambient coordinates, of vectors of d numbers each.
+//
+//   Dot(a, b, d);              // a . b
+//   SquaredDistance(a, b, d);  // |a - b|^2
+//   Distance(a, b, d);         // |a - b|
+//
+// Four running sums: the compiler vectorises them, and the
 // order of additions depends only on d, so that results do not depend on an array's alignment. R^3,
 // the most frequent case, and R^4 are written out so that the calls are inlined, as they are if the
 // compiler knows d.
+//
+// The Unrolled and Long forms are steps of these; call Dot and SquaredDistance.
 [[gnu::always_inline]] inline double UnrolledDot(const double* a, const double* b, int d) {
   double s0 = 0, s1 = 0, s2 = 0, s3 = 0;
   int i = 0;
@@ -25,6 +33,7 @@ namespace stellate::core {
 
 inline double LongDot(const double* a, const double* b, int d) { return UnrolledDot(a, b, d); }
 
+// Returns a . b.
 [[gnu::always_inline]] inline double Dot(const double* a, const double* b, int d) {
   if (d == 3) return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
   if (d == 4) return (a[0] * b[0] + a[1] * b[1]) + (a[2] * b[2] + a[3] * b[3]);
@@ -32,7 +41,9 @@ inline double LongDot(const double* a, const double* b, int d) { return Unrolled
 }
 
 // Returns call(std::integral_constant<int, D>()), D = d if d is small, else 0: loops over
-// coordinates unroll if D is known at compile time.
+// coordinates unroll if D is known at compile time. `call` has to return the same type for all D.
+//
+//   WithDimension(d, [&](auto known) { return Dot(a, b, known() > 0 ? known() : d); });
 template <typename Call>
 inline auto WithDimension(int d, const Call& call) {
   switch (d) {
@@ -53,7 +64,8 @@ inline auto WithDimension(int d, const Call& call) {
   }
 }
 
-// Writes dots[i] = row i . v, for `count` rows of d numbers each.
+// Writes dots[i] = row i . v, for `count` rows of d numbers each: the tangent coordinates of v,
+// where the rows are a tangent basis.
 inline void DotRows(const double* rows, std::size_t count, const double* v, int any_d,
                     double* dots) {
   WithDimension(any_d, [&](auto known) {
@@ -83,6 +95,7 @@ inline double LongSquaredDistance(const double* a, const double* b, int d) {
   return UnrolledSquaredDistance(a, b, d);
 }
 
+// Returns |a - b|^2.
 [[gnu::always_inline]] inline double SquaredDistance(const double* a, const double* b, int d) {
   if (d == 3) {
     const double x = a[0] - b[0], y = a[1] - b[1], z = a[2] - b[2];
@@ -95,6 +108,7 @@ inline double LongSquaredDistance(const double* a, const double* b, int d) {
   return __builtin_constant_p(d) ? UnrolledSquaredDistance(a, b, d) : LongSquaredDistance(a, b, d);
 }
 
+// Returns |a - b|.
 inline double Distance(const double* a, const double* b, int d) {
   return std::sqrt(SquaredDistance(a, b, d));
 }

@@ -15,6 +15,8 @@ namespace stellate::core {
 
 // A finished mesh as the certifier sees it: the complex and the sample, without how they came
 // about. The arrays are borrowed, and must outlive the Certifier.
+//
+//   MeshView mesh{2, 3, 4, points.data(), tangents.data(), &triangles};  // four points of space
 struct MeshView {
   int k = 0, d = 0;
   std::uint64_t vertices = 0;
@@ -62,7 +64,8 @@ struct PointsOnWalls {
   std::vector<WallSet> walls;
 };
 
-// Facts that only the stars give.
+// Facts that only the stars give. The defaults say nothing for the mesh: without `converged` no
+// certificate is given.
 struct StarFacts {
   std::uint64_t inconsistent_simplices = 0;
   double max_circumradius = 0;        // max R_p(sigma)

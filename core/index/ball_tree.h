@@ -23,7 +23,8 @@ namespace stellate::core {
 // points and its outreach, the largest distance from its centre at which one of its points has
 // influence. It is rebuilt balanced whenever it has grown fourfold: O(log n) a point.
 //
-// Deterministic. Queries are const and may run in parallel.
+// Influences and radii are lengths, distances that visitors get are squared. Deterministic. Queries
+// are const and may run in parallel.
 class BallTree {
  public:
   // `coordinates` holds the points, d each, by id; borrowed, may grow and move between calls.
@@ -67,9 +68,10 @@ class BallTree {
     Gather(bunch.centre, bunch.radius + radius, ids);
   }
 
-  // A larger influence takes effect immediately; a smaller one makes searches faster after Refit.
-  // The results are the same.
+  // Changes one influence. A larger one takes effect immediately; a smaller one makes searches
+  // faster after Refit. The results are the same.
   void SetInfluence(std::uint32_t id, double influence);
+  // Call it once after many calls of SetInfluence.
   void Refit();
 
   // Calls visit(id) for each point p with |q - p| < influence(p), in no meaningful but a fixed
@@ -279,7 +281,10 @@ class BallTree {
 };
 
 // Writes the `count` points nearest to q as (squared distance, id), nearest first and ties by id,
-// and returns how many there are.
+// and returns how many there are: fewer only if the tree has fewer.
+//
+//   std::pair<double, std::uint32_t> nearest[2];
+//   const int found = FindNearest(tree, q, 2, nearest);
 inline int FindNearest(const BallTree& tree, const double* q, int count,
                        std::pair<double, std::uint32_t>* nearest) {
   int found = 0;

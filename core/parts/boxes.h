@@ -8,7 +8,12 @@
 
 namespace stellate::core {
 
-// R^d cut into boxes, one a part: what lies in a part's box is its own.
+// R^d cut into boxes, one a part: what lies in a part's box is its own. All parts make the same
+// boxes from the same sample.
+//
+//   const Boxes boxes(sample, d, 4);
+//   const int owner = boxes.OwnerOf(point);
+//   boxes.ForEachNear(point, halo, [&](int part) { near.push_back(part); });
 class Boxes {
  public:
   // All of space, in one box.
@@ -18,8 +23,10 @@ class Boxes {
   Boxes(std::span<const double> points, int d, int parts);
 
   int parts() const { return static_cast<int>(cuts_.size() + 1) / 2; }
+  // Returns the part whose box the point, d coordinates, lies in: always exactly one.
   int OwnerOf(const double* point) const;
-  // Calls visit(part) once for each part whose box the point lies in, or within `halo` of.
+  // Calls visit(part) once for each part whose box is no farther from the point than `halo`, a
+  // length: the box it lies in, and others.
   void ForEachNear(const double* point, double halo, FunctionRef<void(int)> visit) const;
 
  private:

@@ -10,6 +10,9 @@
 namespace stellate::core {
 
 // A part's share of space, and the others that it borders on.
+//
+//   const Territory territory(peers, Boxes(sample, d, peers.parts()));
+//   if (territory.Owns(point)) own.push_back(0);
 class Territory {
  public:
   // The whole.
