@@ -13,7 +13,7 @@ import unittest
 from collections.abc import Iterator
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
-TESTS = {"tests/core": "."}  # where headers are from
+TESTS = {"tests/core": ".", "tests/clients/cpp": "clients/cpp/include"}  # where headers are from
 
 
 def examples(header: str) -> Iterator[str]:

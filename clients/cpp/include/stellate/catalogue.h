@@ -53,11 +53,17 @@ class Manifold final : public Oracle {
   Eigen::MatrixXd frame_;
 };
 
-// Makes "name:parameter:..." or "name:parameter:...@d", the latter turned into R^d by a rotation
-// that depends on the dimensions alone. kRefused: there is none of that name, or its parameters are
-// wrong.
+// Makes a manifold by its name:
+//
+//   const auto torus = stellate::MakeManifold("torus:1:0.4");
+//   if (torus) std::cerr << (*torus)->facts().description << '\n';
+//
+// The name is "name:parameter:..." or "name:parameter:...@d", the latter turned into R^d by a
+// rotation that depends on the dimensions alone. kRefused: there is none of that name, or its
+// parameters are wrong.
 Expected<std::unique_ptr<Manifold>> MakeManifold(const std::string& spec);
 
+// A kind of manifold that MakeManifold makes.
 struct CatalogueEntry {
   std::string syntax;       // e.g. "torus[:R:r]"
   std::string example;      // a spec that MakeManifold takes

@@ -111,7 +111,7 @@ struct MeshOptions {
 //   options.epsilon = 0.1;
 //   const auto mesh = stellate::MeshManifold(oracle, options);
 //   if (!mesh) std::cerr << mesh.error().message;
-//   else if (mesh->report.certified()) ...
+//   else if (mesh->report.certified()) Use(*mesh);
 //
 // Returns a mesh whenever the run ends by itself, certified or not: read Mesh::report. Returns an
 // error if the request is refused, the server cannot be reached, or the oracle's answers break a

@@ -20,6 +20,12 @@ enum class Unfinished {
   kTake,    // fetch it as it is: a complex that need not be closed, and has no report
 };
 
+// What to download, and how to follow it.
+//
+//   stellate::DownloadOptions downloading;
+//   downloading.connection.server = "mesher.example.org:7717";
+//   downloading.unfinished = stellate::Unfinished::kWait;
+//   const auto downloaded = stellate::DownloadMesh("meshes/1b9d6bcd", downloading);
 struct DownloadOptions {
   Connection connection;  // its server must be given; a download resumes after an outage
   Unfinished unfinished = Unfinished::kRefuse;

@@ -20,15 +20,21 @@ enum class ErrorCode {
   kStopped,       // the caller's stop_token ended the call
 };
 
+// What went wrong: the code and the reason for programs, the message for people.
 struct Error {
   ErrorCode code = ErrorCode::kServerFailed;
   std::string reason;   // the server's stable name for it, e.g. "ORACLE_NOT_FINITE"; may be empty
   std::string message;  // what was wrong, where, and what to do
 };
 
+// A value, or the Error that says why there is none.
+//
+//   const stellate::Expected<stellate::Mesh> mesh = stellate::MeshManifold(oracle, options);
+//   if (!mesh) std::cerr << mesh.error().message << '\n';
 template <typename T>
 using Expected = tl::expected<T, Error>;
 
+// What a function of that type returns where it has no value.
 inline tl::unexpected<Error> Fail(ErrorCode code, std::string message, std::string reason = "") {
   return tl::unexpected<Error>(Error{code, std::move(reason), std::move(message)});
 }

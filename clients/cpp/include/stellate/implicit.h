@@ -13,6 +13,12 @@ class Exactness;
 
 // M = { x : F(x) = 0 } for F: R^d -> R^(d-k) whose Jacobian has full rank on M.
 //
+//   const auto f = [](const Eigen::VectorXd& x) {
+//     return Eigen::VectorXd::Constant(1, x.squaredNorm() - 1);
+//   };
+//   const stellate::BoundingBox box = {Eigen::Vector3d::Constant(-2),
+//   Eigen::Vector3d::Constant(2)}; stellate::ImplicitOracle sphere(2, 3, f, {}, box);
+//
 // Closest points by Newton's method on the Lagrange conditions, down to M and along it together:
 // the nearest point when x is nearer to M than its reach, a local minimum of the distance
 // otherwise. Points that do not converge are reported as not found.

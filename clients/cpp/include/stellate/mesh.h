@@ -36,7 +36,11 @@ struct Sides {
   bool operator==(const Sides&) const = default;
 };
 
-// A simplicial k-complex in R^d.
+// A simplicial k-complex in R^d. Of a surface in space, for instance:
+//
+//   for (const auto& ids : stellate::OrientedSimplices(mesh).colwise())
+//     Draw(mesh.points.col(ids[0]), mesh.points.col(ids[1]), mesh.points.col(ids[2]));
+//   const stellate::Expected<void> saved = mesh.Save("surface.vtu");
 struct Mesh {
   Eigen::MatrixXd points;   // d x n, a vertex a column
   SimplexMatrix simplices;  // (k+1) x m; ascending ids in each column, columns in ascending order

@@ -12,6 +12,7 @@
 
 namespace stellate {
 
+// How far a mesh on a server has come. The last four are its ends.
 enum class MeshState {
   kUnknown = 0,
   kWaiting,  // for a worker
@@ -39,6 +40,12 @@ struct MeshStatus {
 };
 
 // Monitors a server over one connection, which is opened again automatically when it is lost.
+//
+//   auto monitor = stellate::Monitor::Connect(connection);
+//   if (!monitor) return;
+//   if (const auto meshes = monitor->Meshes())
+//     for (const stellate::MeshStatus& mesh : *meshes)
+//       std::cerr << mesh.name << ": " << stellate::MeshStateName(mesh.state) << '\n';
 class Monitor {
  public:
   // kRefused: credentials that cannot be used. Whether the server exists shows in the first call.

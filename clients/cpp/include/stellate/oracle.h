@@ -21,10 +21,10 @@ struct BoundingBox {
 
 // The answers to a batch of n queries, column j to query j.
 struct Answer {
-  Eigen::MatrixXd points;           // d x n; ignored where not found
-  std::vector<std::uint8_t> found;  // n, 1 or 0; empty: all found
-  Eigen::MatrixXd tangents;         // (d k) x n laid out as a basis (see Oracle), or empty
-  Eigen::VectorXd sizes;            // n, of the points, or empty
+  Eigen::MatrixXd points;                // d x n; ignored where not found
+  std::vector<std::uint8_t> found = {};  // n, 1 or 0; empty: all found
+  Eigen::MatrixXd tangents = {};         // (d k) x n laid out as a basis (see Oracle), or empty
+  Eigen::VectorXd sizes = {};            // n, of the points, or empty
   // Of walls, as Oracle::Clearances and Conormals have them, or empty.
   Eigen::MatrixXd clearances = {}, conormals = {};
 

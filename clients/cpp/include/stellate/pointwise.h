@@ -9,6 +9,18 @@ namespace stellate {
 // An oracle written one point at a time: implement Project, the closest point, and Tangent, the
 // tangent space there. Batches and flat intersections follow.
 //
+//   struct Circle : stellate::PointwiseOracle {
+//     Circle() : PointwiseOracle(1, 2) {}
+//     bool Project(const Eigen::VectorXd& x, Eigen::VectorXd& y) const override {
+//       y = x.normalized();
+//       return x.norm() > 0;
+//     }
+//     void Tangent(const Eigen::VectorXd& y, Eigen::MatrixXd& tangent) const override {
+//       tangent = Eigen::Vector2d(-y[1], y[0]);
+//     }
+//     Eigen::MatrixXd seeds() const override { return Eigen::Vector2d(1, 0); }
+//   };
+//
 // Project, Tangent and SizeAt must be safe to call from several threads.
 class PointwiseOracle : public Oracle {
  public:

@@ -19,6 +19,12 @@ namespace stellate {
 // yet; a server deletes a mesh that has no worker for too long. Errors as of MeshManifold.
 Expected<std::string> DeclareMesh(Oracle& oracle, const MeshOptions& options);
 
+// How to work for a mesh.
+//
+//   stellate::ServeOptions serving;
+//   serving.connection = options.connection;
+//   const auto name = stellate::DeclareMesh(oracle, options);
+//   if (name) const auto ended = stellate::ServeMesh(oracle, *name, serving);
 struct ServeOptions {
   Connection connection;  // its server must be given
   std::string worker;     // its name, for logs; at most 128 bytes

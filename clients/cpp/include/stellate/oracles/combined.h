@@ -12,6 +12,8 @@ namespace stellate::oracles {
 
 // The product A x B x ... in R^(a + b + ...), points one after the other. Has tangent bases and
 // local sizes if all of its factors, two at least, have.
+//
+//   stellate::oracles::Product flat_torus({circle, circle});  // in R^4
 class Product final : public Oracle {
  public:
   explicit Product(std::vector<std::shared_ptr<Oracle>> factors);
@@ -71,7 +73,7 @@ class Transformed final : public Oracle {
 // and the places that its report names, are in x. epsilon and all other lengths are of x / scale.
 // See docs/fields/scaling.md; MeshOptions::scale is this for one mesh.
 //
-//   oracles::InUnits states(oracle, Eigen::Vector3d(0.01, 500, 1));
+//   stellate::oracles::InUnits states(oracle, Eigen::Vector3d(0.01, 500, 1));
 //   const auto mesh = stellate::MeshManifold(states, options);  // mesh->points as of `oracle`
 //
 // It takes an oracle that has DividedBy, as those of equations, charts, walls and solids have, or

@@ -69,6 +69,7 @@ class ConstraintSet final : public ImplicitOracle {
   ConstraintSet(int ambient_dimension, std::vector<Constraint> constraints, BoundingBox box);
 };
 
+// A bar between two joints.
 struct Bar {
   std::string a, b;  // joints
   double length;
@@ -79,6 +80,9 @@ struct Bar {
 // The points of M are the positions of the joints that move, one after the other, in the order in
 // which the bars name them. M has dimension (joints that move) * (2 or 3) - bars and is a manifold
 // for almost all lengths: not where all bars of a loop can lie on one line.
+//
+//   const stellate::oracles::Linkage::Places fixed = {{"base", Eigen::Vector2d(0, 0)}};
+//   stellate::oracles::Linkage arm({{"base", "elbow", 1}, {"elbow", "hand", 1}}, fixed);  // k = 2
 class Linkage final : public ImplicitOracle {
  public:
   using Places = std::map<std::string, Eigen::VectorXd>;  // in the plane, or in space

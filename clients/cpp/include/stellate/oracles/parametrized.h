@@ -21,6 +21,13 @@ struct Chart {
 
 // A closed manifold that is covered by charts.
 //
+//   stellate::oracles::Chart chart;  // a circle
+//   chart.x = [](const auto& u) { return Eigen::Vector2d(std::cos(u[0]), std::sin(u[0])); };
+//   chart.lower = Eigen::VectorXd::Zero(1);
+//   chart.upper = Eigen::VectorXd::Constant(1, 2 * std::numbers::pi);
+//   chart.periodic = {true};
+//   const auto circle = std::make_shared<stellate::oracles::Parametrized>(chart);
+//
 // Where a parameter is not periodic, the images of other charts have to go on beyond the end of its
 // interval, by some margin: a nearest point at the end of an interval is none. A sphere in angles
 // has no derivative of full rank at its poles and takes two charts.

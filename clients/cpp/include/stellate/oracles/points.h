@@ -16,7 +16,10 @@ namespace stellate::oracles {
 // It is where the least-squares quadric through a place's neighbours, weighted by how near they
 // are, goes through the place itself. Where the points' noise is s, it lies within about s of the
 // manifold that they were taken from, plus bandwidth^3 times the change of its curvature; an
-// epsilon below the bandwidth meshes the smoothing. about() tells what the bandwidth is.
+// epsilon below the bandwidth meshes the smoothing.
+//
+//   stellate::oracles::PointCloud cloud(stellate::oracles::ReadPoints("scan.ply"), 2);
+//   std::cerr << cloud.about() << '\n';  // with the bandwidth
 class PointCloud : public PointwiseOracle {
  public:
   // The points (d x n) have to lie on all of the manifold, at distances well below its reach.

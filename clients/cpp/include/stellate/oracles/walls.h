@@ -36,6 +36,9 @@ Wall Ball(const Eigen::VectorXd& centre, double radius);
 
 // {x in M : g(x) >= 0 for all walls g}: a manifold with boundary, edges and corners.
 //
+//   const stellate::oracles::Wall upper = stellate::oracles::HalfSpace(Eigen::Vector2d::UnitY());
+//   stellate::oracles::Clipped arc(circle, {upper});
+//
 // Where several walls meet on M they have to cross at an angle: tangential walls are refused. Asked
 // for values of a wall that rounds to single precision it throws OracleError.
 class Clipped : public Oracle {
