@@ -4,6 +4,7 @@
 
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <filesystem>
 #include <stdexcept>
 #include <string_view>
 #include <utility>
@@ -229,6 +230,9 @@ Expected<std::unique_ptr<Oracle>> OracleSource::MakeUnclipped(std::stop_token st
   if (!solid_.empty() || !materials_.empty()) return MakeSolid();
   if (command_.command.empty()) {
     if (manifold_.empty()) return NoSuch("name a manifold, or give --solid or --oracle-command");
+    if (std::filesystem::is_regular_file(manifold_))
+      return NoSuch("'" + manifold_ +
+                    "' is a file: points in one are meshed by 'stellate reconstruct'");
     Expected<std::unique_ptr<Oracle>> domain = oracles::MakeDomain(manifold_);
     if (domain) return domain;
     if (domain.error().reason != "UNKNOWN_NAME") return NoSuch(domain.error().message);

@@ -16,8 +16,19 @@ ReconstructCommand::ReconstructCommand(CLI::App& parent)
       ->add_option("points", points_,
                    ".ply, .npy, .csv, .xyz or .txt; -: a point a line from standard input")
       ->required();
-  command_->add_option("-k,--dimension", options_.dimension, "dimension of the manifold, 1 to 3")
-      ->required();
+  const CLI::Option* const dimension =
+      command_
+          ->add_option("-k,--dimension", options_.dimension,
+                       "dimension of the manifold, 1 to 3: 1 for a curve, 2 for a surface")
+          ->type_name("INT REQUIRED");
+  // CLI11 would say only that it is required.
+  command_->final_callback([dimension] {
+    if (dimension->count() > 0) return;
+    throw CLI::RequiredError(
+        "-k is required: the dimension of the manifold that the points lie on, 1 for a curve, 2 "
+        "for a surface",
+        CLI::ExitCodes::RequiredError);
+  });
   outputs_.AddTo(command_);
   command_->add_option("--ambient", coordinates_,
                        "coordinates of a point; the first of each line, where there are more");

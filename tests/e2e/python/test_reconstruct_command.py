@@ -89,7 +89,7 @@ def test_what_is_not_certified_is_written_and_exits_with_1(torus, tmp_path):
 @pytest.mark.parametrize(
     "arguments, given, words",
     [
-        (["-"], "1 2 3\n", "--dimension is required"),
+        (["-"], "1 2 3\n", "-k is required: the dimension"),
         (["-", "-k", "2"], "1 2 3\n4 5\n", "line 2: has 2 numbers, and line 1 has 3"),
         (["-", "-k", "2"], "1 2 3\n4 nan 5\n", "line 2: 'nan' is no finite number"),
         (["-", "-k", "2"], "", "standard input cannot be read as points: it has no points"),
@@ -125,3 +125,11 @@ def test_help_says_what_there_is(tmp_path):
         "--report",
     ):
         assert option in said
+
+
+def test_a_file_in_place_of_a_manifold_is_led_here(tmp_path):
+    (tmp_path / "scan.xyz").write_text("1 2 3\n")
+    command = [STELLATE, "mesh", "scan.xyz", "-e", "0.1"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True)
+    assert done.returncode == 2
+    assert "'scan.xyz' is a file: points in one are meshed by 'stellate reconstruct'" in done.stderr
