@@ -14,8 +14,8 @@ namespace {
 using core::Status;
 using core::StatusCode;
 
-// The end of a list of simplices.
-constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+// The end of a list of simplices; numbers and revisions are below it.
+constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max() >> 1;
 // Simplices looked at for one part: bounds the time spent under the lock.
 constexpr std::size_t kScanLimit = std::size_t{1} << 18;
 
@@ -64,25 +64,25 @@ MeshHistory::MeshHistory(int dimension, int ambient_dimension, int labels)
       points_(d_),
       smoothed_(d_),
       rows_(row_size_),
-      died_(1),
+      lives_(1),
       labels_(label_count_),
       deaths_(1),
       marks_(1),
-      next_(1) {}
+      first_of_(1) {}
 
 // Takes a simplex from the living; kNone if it is not among them.
 std::uint32_t MeshHistory::Unlink(const std::uint32_t* row) {
   if (row[0] >= first_of_.size()) return kNone;
-  std::uint32_t* link = &first_of_[row[0]];
-  while (*link != kNone && !std::equal(row, row + row_size_, rows_[*link])) link = next_[*link];
+  std::uint32_t* link = first_of_[row[0]];
+  while (*link != kNone && !std::equal(row, row + row_size_, rows_[*link])) link = lives_[*link];
   const std::uint32_t simplex = *link;
-  if (simplex != kNone) *link = *next_[simplex];
+  if (simplex != kNone) *link = *lives_[simplex];
   return simplex;
 }
 
 void MeshHistory::Link(std::uint32_t simplex) {
-  std::uint32_t& first = first_of_[*rows_[simplex]];
-  *next_[simplex] = first;
+  std::uint32_t& first = *first_of_[*rows_[simplex]];
+  *lives_[simplex] = first;
   first = simplex;
 }
 
@@ -112,6 +112,8 @@ Status MeshHistory::Append(const core::MeshDelta& delta, const PointPlaces& plac
     return OutOfStep(core::Message("revision ", revision, " adds a simplex with vertex ",
                                    delta.added[i * row_size_], ", which is not there"));
   }
+  const std::vector<std::uint32_t> no_lists(new_vertices, kNone);
+  const std::lock_guard lock(mutex_);
   std::vector<std::uint32_t> dying;
   dying.reserve(delta.removed.size() / row_size_);
   for (std::size_t r = 0; r + row_size_ <= delta.removed.size(); r += row_size_) {
@@ -132,28 +134,21 @@ Status MeshHistory::Append(const core::MeshDelta& delta, const PointPlaces& plac
                                    places.codes.size(), " points and the positions of ", smoothed,
                                    ", and has ", vertices));
   }
-  const std::vector<std::uint32_t> alive(new_simplices, 0);
-  {
-    const std::lock_guard lock(mutex_);
-    for (const std::uint32_t simplex : dying)
-      *died_[simplex] = static_cast<std::uint32_t>(revision);
-    deaths_.Append(dying.data(), dying.size());
-    points_.Append(delta.points.data(), new_vertices);
-    for (std::size_t v = 0; v < delta.walls.size(); ++v)
-      if (delta.walls[v] != 0) boundary_.push_back({last.vertices + v, delta.walls[v]});
-    rows_.Append(delta.added.data(), new_simplices);
-    died_.Append(alive.data(), new_simplices);
-    labels_.Append(delta.labels.data(), delta.labels.size() / label_count_);
-    if (!places.codes.empty()) places_ = places.codes;
-    smoothed_.Append(places.smoothed.data(), smoothed);
-    marks_.push_back({last.vertices + new_vertices, first_simplex + new_simplices, deaths_.size()});
-  }
-  first_of_.resize(marks_.back().vertices, kNone);
-  next_.Append(delta.added.data(), new_simplices);  // any numbers: Link sets them
-  for (std::size_t i = 0; i < new_simplices; ++i) {
+  for (const std::uint32_t simplex : dying)
+    *lives_[simplex] = kDead + static_cast<std::uint32_t>(revision);
+  deaths_.Append(dying.data(), dying.size());
+  points_.Append(delta.points.data(), new_vertices);
+  for (std::size_t v = 0; v < delta.walls.size(); ++v)
+    if (delta.walls[v] != 0) boundary_.push_back({last.vertices + v, delta.walls[v]});
+  rows_.Append(delta.added.data(), new_simplices);
+  labels_.Append(delta.labels.data(), delta.labels.size() / label_count_);
+  if (!places.codes.empty()) places_ = places.codes;
+  smoothed_.Append(places.smoothed.data(), smoothed);
+  first_of_.Append(no_lists.data(), new_vertices);
+  lives_.Append(delta.added.data(), new_simplices);  // any numbers: Link sets them
+  for (std::size_t i = 0; i < new_simplices; ++i)
     Link(static_cast<std::uint32_t>(first_simplex + i));
-  }
-  appenders_bytes_ = first_of_.capacity() * sizeof(first_of_[0]) + next_.bytes();
+  marks_.push_back({last.vertices + new_vertices, first_simplex + new_simplices, deaths_.size()});
   return Status::Ok();
 }
 
@@ -162,13 +157,13 @@ std::vector<std::uint32_t> MeshHistory::SortLiving() const {
   std::vector<std::uint32_t> end(marks_.back().vertices + 1, 0);  // of those with a lowest vertex
   for (std::size_t s = 0; s < rows_.size(); ++s) {
     core::CheckInterruption(s);
-    if (*died_[s] == 0) ++end[*rows_[s] + 1];
+    if (DiedAt(s) == 0) ++end[*rows_[s] + 1];
   }
   std::partial_sum(end.begin(), end.end(), end.begin());
   std::vector<std::uint32_t> living(end.back());
   for (std::size_t s = 0; s < rows_.size(); ++s) {
     core::CheckInterruption(s);
-    if (*died_[s] == 0) living[end[*rows_[s]]++] = static_cast<std::uint32_t>(s);
+    if (DiedAt(s) == 0) living[end[*rows_[s]]++] = static_cast<std::uint32_t>(s);
   }
   core::ParallelFor(marks_.back().vertices, [&](std::size_t v) {
     const auto first = static_cast<std::ptrdiff_t>(v == 0 ? 0 : end[v - 1]);
@@ -205,9 +200,7 @@ void MeshHistory::Orient() {
   complete_ = true;
   orientation_ = std::move(orientation);
   sorted_ = std::move(sorted);
-  first_of_ = {};
-  next_ = GrowingRows<std::uint32_t>(1);
-  appenders_bytes_ = 0;
+  first_of_ = GrowingRows<std::uint32_t>(1);
 }
 
 std::optional<core::Orientation> MeshHistory::orientation() const {
@@ -317,8 +310,8 @@ bool MeshHistory::ReadRows(const Source& read) {
     marks_.push_back(mark);
   }
   const Mark& end = marks_.back();
-  return revisions < kNone && end.vertices <= kNone && end.simplices < kNone &&
-         ReadInto(&points_, d_, end.vertices, read) &&
+  return revisions < kNone && end.vertices <= std::numeric_limits<std::uint32_t>::max() &&
+         end.simplices < kNone && ReadInto(&points_, d_, end.vertices, read) &&
          ReadInto(&rows_, row_size_, end.simplices, read) &&
          ReadInto(&deaths_, 1, end.deaths, read) && ReadWalls(read) && ReadOrientation(read) &&
          ReadPlaces(read) && ReadLabels(read);
@@ -330,14 +323,13 @@ bool MeshHistory::ComputeLives() {
     const Mark &from = marks_[revision - 1], &to = marks_[revision];
     for (std::uint64_t i = from.deaths; i < to.deaths; ++i) {
       const std::uint32_t simplex = *deaths_[i];
-      if (simplex >= died_.size() || *died_[simplex] != 0) return false;
-      *died_[simplex] = static_cast<std::uint32_t>(revision);
+      if (simplex >= lives_.size() || DiedAt(simplex) != 0) return false;
+      *lives_[simplex] = kDead + static_cast<std::uint32_t>(revision);
     }
-    const std::uint32_t alive = 0;
     for (std::uint64_t simplex = from.simplices; simplex < to.simplices; ++simplex) {
       const std::uint32_t* const row = rows_[simplex];
       if (*std::max_element(row, row + row_size_) >= to.vertices) return false;
-      died_.Append(&alive, 1);
+      lives_.Append(&kNone, 1);  // what is read back has no lists
     }
   }
   return true;
@@ -358,8 +350,8 @@ std::uint64_t MeshHistory::MemoryBytes() const {
   const std::lock_guard lock(mutex_);
   return points_.bytes() + places_.capacity() + smoothed_.bytes() + labels_.bytes() +
          boundary_.capacity() * sizeof(OnWalls) + sorted_.capacity() * sizeof(sorted_[0]) +
-         (orientation_ ? orientation_->turned.capacity() : 0) + rows_.bytes() + died_.bytes() +
-         deaths_.bytes() + marks_.capacity() * sizeof(Mark) + appenders_bytes_;
+         (orientation_ ? orientation_->turned.capacity() : 0) + rows_.bytes() + lives_.bytes() +
+         deaths_.bytes() + marks_.capacity() * sizeof(Mark) + first_of_.bytes();
 }
 
 bool MeshHistory::IsSorted(std::uint64_t revision) const {
@@ -479,7 +471,7 @@ void MeshHistory::AppendAdded(Cursor* cursor, std::size_t end, std::size_t max_r
   part->added.reserve(std::min(stop - cursor->added, max_rows) * row_size_);
   std::size_t rows = 0;
   for (; cursor->added < stop; ++cursor->added) {
-    const std::uint32_t died = *died_[cursor->added];
+    const std::uint32_t died = DiedAt(cursor->added);
     if (died != 0 && died <= cursor->to) continue;
     if (rows++ == max_rows) return;
     AppendRow(static_cast<std::uint32_t>(cursor->added), part);

@@ -2,7 +2,6 @@
 
 #include <Eigen/Core>
 #include <algorithm>
-#include <atomic>
 #include <bit>
 #include <cstdint>
 #include <functional>
@@ -177,6 +176,12 @@ class MeshHistory {
   bool ReadPlaces(const Source& read);
   void AppendPlaces(std::uint64_t end, DeltaPart* part) const;
   bool ComputeLives();
+  static constexpr std::uint32_t kDead = std::uint32_t{1} << 31;
+  // At which revision; 0: it is alive.
+  std::uint32_t DiedAt(std::size_t simplex) const {
+    const std::uint32_t life = *lives_[simplex];
+    return life >= kDead ? life - kDead : 0;
+  }
   std::uint32_t Unlink(const std::uint32_t* row);
   void Link(std::uint32_t simplex);
   bool IsSorted(std::uint64_t revision) const;
@@ -198,8 +203,9 @@ class MeshHistory {
   // By vertex, of a reconstruction that is over; else empty. smoothed_: of no or of all vertices.
   std::vector<std::uint8_t> places_;
   GrowingRows<double> smoothed_;
-  GrowingRows<std::uint32_t> rows_;    // ids of every simplex so far
-  GrowingRows<std::uint32_t> died_;    // by simplex, at which revision; 0: alive
+  GrowingRows<std::uint32_t> rows_;  // ids of every simplex so far
+  // By simplex: the next in its list, or once it is removed kDead and the revision at which it was.
+  GrowingRows<std::uint32_t> lives_;
   GrowingRows<std::int8_t> labels_;    // by simplex, where it has any; else empty
   GrowingRows<std::uint32_t> deaths_;  // simplices in the order of their removal
   struct Mark {
@@ -211,11 +217,9 @@ class MeshHistory {
   std::optional<core::Orientation> orientation_;
   std::vector<std::uint32_t> sorted_;
 
-  // For the appending thread only, until the last revision: the simplices of the newest one, in a
-  // list for each vertex, by their lowest vertex. A list is at most as long as a star.
-  std::vector<std::uint32_t> first_of_;            // by vertex
-  GrowingRows<std::uint32_t> next_;                // by simplex
-  std::atomic<std::uint64_t> appenders_bytes_{0};  // of these two, for other threads
+  // Until the last revision: the simplices of the newest one, in a list for each vertex, by their
+  // lowest vertex. A list is at most as long as a star.
+  GrowingRows<std::uint32_t> first_of_;  // by vertex
 };
 
 }  // namespace stellate::server
