@@ -105,37 +105,39 @@ ShapeSearch::ShapeSearch(const MeshView& mesh, const SimplexList& list) : mesh_(
   shape_.tilts.resize(list.size());
 }
 
-void ShapeSearch::MeasureByFrame(std::uint32_t s, Part* part) {
+void ShapeSearch::MeasureByFrame(std::uint32_t s, Worker* worker) {
   Corners corners;
-  const SimplexVertices vertices = FrameCorners(mesh_, list_[s], corners, part->frame);
-  const SimplexMeasures m = MeasureSimplex(vertices, mesh_.d, part->frame);
+  const SimplexVertices vertices = FrameCorners(mesh_, list_[s], corners, worker->frame);
+  const SimplexMeasures m = MeasureSimplex(vertices, mesh_.d, worker->frame);
   const double radius =
       HasProtectedVertex(mesh_, list_[s]) ? RadiusAmongProtected(mesh_, list_[s]) : m.circumradius;
   const double ratio = m.RadiusEdgeRatio(), fatness = m.Fatness();
-  if (radius > part->circumradius || (radius == part->circumradius && s < part->largest)) {
-    part->circumradius = radius;
-    part->largest = s;
+  Extremes* const found = &worker->found;
+  if (radius > found->circumradius || (radius == found->circumradius && s < found->largest)) {
+    found->circumradius = radius;
+    found->largest = s;
   }
-  if (ratio > part->radius_edge || (ratio == part->radius_edge && s < part->longest)) {
-    part->radius_edge = ratio;
-    part->longest = s;
+  if (ratio > found->radius_edge || (ratio == found->radius_edge && s < found->longest)) {
+    found->radius_edge = ratio;
+    found->longest = s;
   }
-  part->fatness = std::min(part->fatness, fatness);
+  found->fatness = std::min(found->fatness, fatness);
   Raise(radius2_, radius * radius);
   Raise(radius_edge2_, ratio * ratio);
   Lower(fatness2_, fatness * fatness);
 }
 
-double ShapeSearch::TiltByFrame(std::uint32_t s, std::uint32_t vertex, Part* part) const {
+double ShapeSearch::TiltByFrame(std::uint32_t s, std::uint32_t vertex, Worker* worker) const {
   Corners corners;
-  FrameCorners(mesh_, list_[s], corners, part->frame);
-  if (part->frame.rank < mesh_.k) return mesh_.k;
-  return SumOfSquaredSines(part->frame, mesh_.k, mesh_.d, mesh_.Tangent(vertex), mesh_.k);
+  FrameCorners(mesh_, list_[s], corners, worker->frame);
+  if (worker->frame.rank < mesh_.k) return mesh_.k;
+  return SumOfSquaredSines(worker->frame, mesh_.k, mesh_.d, mesh_.Tangent(vertex), mesh_.k);
 }
 
-double ShapeSearch::LargestTilt(std::uint32_t s, Part* part) const {
+double ShapeSearch::LargestTilt(std::uint32_t s, Worker* worker) const {
   double largest = 0;
-  for (int i = 0; i <= mesh_.k; ++i) largest = std::max(largest, TiltByFrame(s, list_[s][i], part));
+  for (int i = 0; i <= mesh_.k; ++i)
+    largest = std::max(largest, TiltByFrame(s, list_[s][i], worker));
   return largest;
 }
 
@@ -153,9 +155,9 @@ double ShapeSearch::MaxSine2(float largest_tilt) const {
       });
   double most = -1;
   std::uint32_t most_tilted = 0;
-  Part part;
+  Worker worker;
   for (const std::uint32_t s : first) {
-    const double tilt = LargestTilt(s, &part);
+    const double tilt = LargestTilt(s, &worker);
     if (!(tilt > most)) continue;
     most = tilt;
     most_tilted = s;
@@ -172,10 +174,10 @@ double ShapeSearch::MaxSine2(float largest_tilt) const {
   return *std::max_element(parts.begin(), parts.end());
 }
 
-MeshShape ShapeSearch::Conclude(const std::vector<Part>& parts) {
+MeshShape ShapeSearch::Conclude(const std::vector<Extremes>& parts) {
   constexpr double kDegrees = 180 / std::numbers::pi;
-  Part all;
-  for (const Part& part : parts) {
+  Extremes all;
+  for (const Extremes& part : parts) {
     if (part.circumradius > all.circumradius ||
         (part.circumradius == all.circumradius && part.largest < all.largest)) {
       all.circumradius = part.circumradius;

@@ -35,32 +35,36 @@ inline constexpr double kTiltError = 1e-9;
 // one that may be extreme is measured again by its frame, to the last digit. The result does not
 // depend on the order.
 //
-//   search.Measure(s, gram, shortest2, longest2, &part);  // once for each simplex
-//   search.Tilt(s, v, gram, columns, &part);              // once for each of its vertices
-//   MeshShape shape = search.Conclude(parts);
+//   search.Measure(s, gram, shortest2, longest2, &worker);  // once for each simplex
+//   search.Tilt(s, v, gram, columns, &worker);              // once for each of its vertices
+//   MeshShape shape = search.Conclude(extremes);            // of all workers
 class ShapeSearch {
  public:
   ShapeSearch(const MeshView& mesh, const SimplexList& list);
 
-  // The extremes of some of the simplices: one for each thread.
-  struct Part {
+  // The extremes of some of the simplices.
+  struct Extremes {
     double circumradius = 0, diameter = 0, radius_edge = 0;
     double fatness = std::numeric_limits<double>::infinity();
     float tilt = 0;
     std::uint32_t largest = 0, longest = 0;  // of circumradius and radius-edge, the first
-    SimplexFrame frame;                      // working memory
+  };
+  // Who measures these. Its memory is hundreds of times as large: keep it no longer than that.
+  struct Worker {
+    Extremes found;
+    SimplexFrame frame;
   };
 
   // Measures a simplex; call it once for each. `gram`: null if it is too ill-conditioned to use.
   // Edges are squared lengths.
   template <int K>
   void Measure(std::uint32_t s, const SimplexGram<K>* gram, double shortest2, double longest2,
-               Part* part) {
+               Worker* worker) {
     const double diameter = std::sqrt(longest2);
-    part->diameter = std::max(part->diameter, diameter);
+    worker->found.diameter = std::max(worker->found.diameter, diameter);
     shape_.diameters[s] = static_cast<float>(diameter);
     if (gram && !MayBeExtreme(*gram, shortest2, longest2)) return;
-    MeasureByFrame(s, part);
+    MeasureByFrame(s, worker);
   }
 
   // Measures the tilt of a simplex from the tangent space at one of its vertices; call it once for
@@ -68,7 +72,7 @@ class ShapeSearch {
   // tangent coordinates of the vertex.
   template <int K>
   void Tilt(std::uint32_t s, std::uint32_t vertex, const SimplexGram<K>* gram,
-            const std::array<const double*, K>& columns, Part* part) {
+            const std::array<const double*, K>& columns, Worker* worker) {
     double tilt = K;
     if (gram) {
       for (int a = 0; a < K; ++a) {
@@ -77,10 +81,10 @@ class ShapeSearch {
         tilt -= gram->InverseForm(row);
       }
     } else {
-      tilt = TiltByFrame(s, vertex, part);
+      tilt = TiltByFrame(s, vertex, worker);
     }
     const auto rounded = static_cast<float>(tilt);
-    part->tilt = std::max(part->tilt, rounded);
+    worker->found.tilt = std::max(worker->found.tilt, rounded);
     const std::atomic_ref<float> largest(shape_.tilts[s]);
     float known = largest.load(std::memory_order_relaxed);
     while (known < rounded &&
@@ -88,7 +92,7 @@ class ShapeSearch {
     }
   }
 
-  MeshShape Conclude(const std::vector<Part>& parts);
+  MeshShape Conclude(const std::vector<Extremes>& parts);
 
  private:
   static constexpr double kMargin = 1e-6;  // the relative error of Gram matrices
@@ -106,9 +110,9 @@ class ShapeSearch {
            gram.determinant * (1 - kMargin) <=
                faculty * faculty * power * fatness2_.load(std::memory_order_relaxed);
   }
-  void MeasureByFrame(std::uint32_t s, Part* part);
-  double TiltByFrame(std::uint32_t s, std::uint32_t vertex, Part* part) const;
-  double LargestTilt(std::uint32_t s, Part* part) const;
+  void MeasureByFrame(std::uint32_t s, Worker* worker);
+  double TiltByFrame(std::uint32_t s, std::uint32_t vertex, Worker* worker) const;
+  double LargestTilt(std::uint32_t s, Worker* worker) const;
   double MaxSine2(float largest_tilt) const;
 
   const MeshView& mesh_;

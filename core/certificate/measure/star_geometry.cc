@@ -29,7 +29,7 @@ StarGeometry RunSweep(Sweep& sweep, Numbers* numbers) {
   StarGeometry whole;
   if (sweep.is_refuted) return whole;
   whole.reach = std::numeric_limits<double>::infinity();
-  std::vector<ShapeSearch::Part> shapes;
+  std::vector<ShapeSearch::Extremes> shapes;
   shapes.reserve(parts.size());
   for (PartOfStars& part : parts) {
     StarGeometry& stars = part.stars;
@@ -41,7 +41,7 @@ StarGeometry RunSweep(Sweep& sweep, Numbers* numbers) {
     if (whole.unembedded_stars == 0) whole.first_unembedded = std::move(stars.first_unembedded);
     whole.unembedded_stars += stars.unembedded_stars;
     AppendFirst(stars.some_unembedded, Violations::kMost, &whole.some_unembedded);
-    shapes.push_back(std::move(part.shape));
+    shapes.push_back(part.shape);
     numbers->neighbours += part.neighbours;
     numbers->unused += part.unused;
   }

@@ -50,7 +50,7 @@ struct Sweep {
 // The result for some of the vertices.
 struct PartOfStars {
   StarGeometry stars;
-  ShapeSearch::Part shape;
+  ShapeSearch::Extremes shape;
   std::uint64_t neighbours = 0;  // of the vertices, in all
   std::uint64_t unused = 0;      // vertices
 };
@@ -90,6 +90,7 @@ class StarMeasurer {
         if (sweep_.is_refuted) return;
       }
     });
+    part_.shape = shapes_.found;
   }
 
  private:
@@ -169,14 +170,14 @@ class StarMeasurer {
       if (places_[m] == 0) {
         const auto [shortest2, longest2] = TakeEdges(IdsOf(m), d, &gram);
         const SimplexGram<K>* telling = gram.Factor() ? &gram : nullptr;
-        sweep_.shape.Tilt<K>(s, p, telling, ColumnsOf(m), &part_.shape);
-        sweep_.shape.Measure<K>(s, telling, shortest2, longest2, &part_.shape);
+        sweep_.shape.Tilt<K>(s, p, telling, ColumnsOf(m), &shapes_);
+        sweep_.shape.Measure<K>(s, telling, shortest2, longest2, &shapes_);
         continue;
       }
       for (int c = 1; c < K; ++c)
         for (int e = 0; e < c; ++e)
           gram.dots[c][e] = Dot(OffsetOf(column[c], d), OffsetOf(column[e], d), d);
-      sweep_.shape.Tilt<K>(s, p, gram.Factor() ? &gram : nullptr, ColumnsOf(m), &part_.shape);
+      sweep_.shape.Tilt<K>(s, p, gram.Factor() ? &gram : nullptr, ColumnsOf(m), &shapes_);
     }
   }
 
@@ -356,6 +357,7 @@ class StarMeasurer {
   const std::uint32_t* const ids_;  // of all simplices
   PartOfStars& part_;
   StarGeometry& result_;
+  ShapeSearch::Worker shapes_;
   std::span<const std::uint32_t> star_;  // of the centre at hand
   SmallIndex index_;                     // of the neighbours
   std::vector<Neighbour> neighbours_;    // by number in the index; then some of stars before
