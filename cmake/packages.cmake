@@ -72,7 +72,8 @@ The program stellate meshes on a server, fetches meshes from one, watches it,
 and probes oracles.")
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_TOOLS_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_TOOLS_PACKAGE_RECOMMENDS "stellate-server (= ${PROJECT_VERSION})")
+set(CPACK_DEBIAN_TOOLS_PACKAGE_RECOMMENDS
+  "ca-certificates, stellate-server (= ${PROJECT_VERSION})")
 
 set(CPACK_COMPONENT_MPI_DESCRIPTION "Meshes smooth manifolds: in the ranks of an MPI job
 The program stellate-mpi makes one mesh in all ranks of a job, with an oracle in

@@ -101,9 +101,11 @@ class SameCertificate final : public tls::ExternalCertificateVerifier {
 // Shows the server's own certificate.
 tls::TlsChannelCredentialsOptions OwnOptions(const Config& config) {
   tls::TlsChannelCredentialsOptions options;
+  // No root is consulted, but gRPC wants one, and without ours it fails where a machine has none.
   options.set_certificate_provider(std::make_shared<tls::FileWatcherCertificateProvider>(
-      config.tls_key, config.tls_certificate, kRefreshSeconds));
+      config.tls_key, config.tls_certificate, config.tls_certificate, kRefreshSeconds));
   options.watch_identity_key_cert_pairs();
+  options.watch_root_certs();
   options.set_verify_server_certs(false);
   options.set_check_call_host(false);
   return options;

@@ -1,5 +1,6 @@
 """TLS, client certificates and tokens, from Python and from the command line."""
 
+import os
 import pathlib
 import subprocess
 
@@ -75,6 +76,21 @@ def test_health_under_mutual_tls(files, tmp_path):
             assert subprocess.run(ask, cwd=files, capture_output=True).returncode == 1
             ask += ["--health-cert", "other.pem", "--health-key", "other.key"]
             assert subprocess.run(ask, cwd=files).returncode == 0
+        finally:
+            process.terminate()
+
+
+def test_health_where_no_authority_is_installed(files, tmp_path):
+    """gRPC fails on roots that it cannot use, also where it is to verify nothing by them."""
+    program = stellate.server.find_stellated()
+    server = ["--tls-cert", "server.pem", "--tls-key", "server.key"]
+    (tmp_path / "roots.pem").write_text("none")
+    bare = {**os.environ, "GRPC_DEFAULT_SSL_ROOTS_FILE_PATH": str(tmp_path / "roots.pem")}
+    command = [program, "--listen", "127.0.0.1:0", *server]
+    with subprocess.Popen(command, cwd=files, stdout=subprocess.PIPE, text=True) as process:
+        try:
+            ask = [program, "--health-check", "--listen", process.stdout.readline().split()[-1]]
+            assert subprocess.run([*ask, *server], cwd=files, env=bare).returncode == 0
         finally:
             process.terminate()
 
