@@ -88,6 +88,10 @@ std::string_view Advice(const grpc::Status& status) {
     return "the server's certificate is of no authority that is trusted here: --tls-ca FILE names "
            "one (in C++ Credentials::tls_ca)";
   }
+  if (says("empty address list")) {  // as gRPC puts it that it has no roots
+    return "with TLS: no authority of certificates can be read on this machine; install "
+           "ca-certificates, or --tls-ca FILE names one (in C++ Credentials::tls_ca)";
+  }
   if (says("failed to connect") && (says("Socket closed") || says("Connection reset"))) {
     return "does the server want TLS? --tls or --tls-ca FILE. Or a client certificate? --tls-cert "
            "and --tls-key (in C++ Credentials)";

@@ -91,6 +91,9 @@ def test_health_where_no_authority_is_installed(files, tmp_path):
         try:
             ask = [program, "--health-check", "--listen", process.stdout.readline().split()[-1]]
             assert subprocess.run([*ask, *server], cwd=files, env=bare).returncode == 0
+            client = [pathlib.Path(program).with_name("stellate"), "health", "--tls", "--server"]
+            said = subprocess.run([*client, ask[-1]], env=bare, capture_output=True, text=True)
+            assert said.returncode == 3 and "install ca-certificates" in said.stderr
         finally:
             process.terminate()
 
