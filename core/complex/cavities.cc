@@ -6,11 +6,13 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 
 #include "core/base/instantiate.h"
 #include "core/base/parallel.h"
 #include "core/base/parallel_sort.h"
 #include "core/complex/cavity_census.h"
+#include "core/complex/labels.h"
 #include "core/geometry/simplex.h"
 
 namespace stellate::core {
@@ -68,7 +70,8 @@ class Cavity {
   const std::vector<Simplex>& filling() const { return filling_; }
 
   bool Fill() {
-    if (vertices_.size() > kMostVertices || !Orient() || !FindBoundary()) return false;
+    if (vertices_.size() > kMostVertices || !FindSectors() || !Orient() || !FindBoundary())
+      return false;
     for (const Simplex& s : doubtful_) Propose(s);
     if (Search()) return true;
     if (vertices_.size() > kAllSubsets) return false;
@@ -99,6 +102,16 @@ class Cavity {
     std::copy(s.begin(), s.begin() + i, facet.begin());
     std::copy(s.begin() + i + 1, s.end(), facet.begin() + i);
     return facet;
+  }
+
+  // Each vertex's sector in the region.
+  bool FindSectors() {
+    for (const std::uint32_t p : vertices_) {
+      const std::optional<int> sector = census_.SectorOf(p);
+      if (!sector) return false;
+      sectors_.push_back(*sector);
+    }
+    return true;
   }
 
   // How each vertex's tangent basis is oriented relative to that of the vertex nearest to all.
@@ -183,7 +196,7 @@ class Cavity {
     }
     loose_.assign(vertices_.size(), 1);
     for (std::size_t i = 0; i < vertices_.size(); ++i) {
-      const auto& cell = stars_.cell(vertices_[i]);
+      const auto& cell = stars_.cell(vertices_[i], sectors_[i]);
       Simplex s;
       for (std::size_t v = 0; v < cell.vertex_count(); ++v)
         if (stars_.SimplexOf(vertices_[i], cell, v, &s) && !census_.IsDoubtful(s)) {
@@ -211,10 +224,12 @@ class Cavity {
       const double* const outward =
           stars_.sample().Conormals(p) +
           K * CountWalls(stars_.sample().walls(p) & (SetOfWall(wall) - 1));
+      const Site site = stars_.sample().At(p, sectors_[Place(p)]);
+      const double sign = IsSubset(SetOfWall(wall), site.reversed) ? -1 : 1;
       double m[K][K];
       for (int i = 0; i < K; ++i) {
         stars_.sample().Project(p, stars_.sample().Point(facet[static_cast<std::size_t>(i)]), m[i]);
-        for (int a = 0; a < K; ++a) m[i][a] -= outward[a];
+        for (int a = 0; a < K; ++a) m[i][a] -= sign * outward[a];
       }
       const int here = Sign(Determinant<K>(m)) * orientation_[Place(p)];
       if (here == 0 || (side != 0 && here != side)) return 0;
@@ -242,7 +257,7 @@ class Cavity {
     if (rules_.sliver_bound > 0 && ContainsSliver(span, stars_.sample().d(), rules_.sliver_bound))
       return;
     const int orientation = OrientationOf(s, s);
-    if (orientation == 0) return;
+    if (orientation == 0 || !IsInRegion(s)) return;
     Candidate c{s, {}, {}, census_.Holders(s), measures.Fatness()};
     for (int i = 0; i <= K; ++i) {
       const Facet facet = Without(s, i);
@@ -261,6 +276,13 @@ class Cavity {
     for (const int f : c.facet)
       by_facet_[static_cast<std::size_t>(f)].push_back(static_cast<int>(candidates_.size()));
     candidates_.push_back(c);
+  }
+
+  // A simplex on walls alone may be taken for one of the region beyond.
+  bool IsInRegion(const Simplex& s) const {
+    const Sectors& sectors = stars_.sample().sectors();
+    return sectors.labels().empty() ||
+           LabelOf(stars_, s.data()) == sectors.Label(s[0], sectors_[Place(s[0])]);
   }
 
   bool Fits(const Candidate& c, std::size_t slot) const {
@@ -338,6 +360,7 @@ class Cavity {
   const FillingRules& rules_;
   std::vector<Simplex> doubtful_;
   std::vector<std::uint32_t> vertices_;  // ascending
+  std::vector<int> sectors_;             // by vertex
   std::vector<int> orientation_;         // by vertex
   std::vector<std::uint8_t> loose_;      // by vertex: in no agreed simplex
   std::map<Facet, int> facets_;
@@ -349,34 +372,56 @@ class Cavity {
   int steps_ = 0;
 };
 
-}  // namespace
-
+// The regions of an arrangement that have points, ascending; without labels there is one.
 template <int K>
-FilledCavities FillCavities(const Stars<K>& stars, const FillingRules& rules) {
-  const Census<K> census(stars);
+std::vector<std::uint64_t> RegionsOf(const Stars<K>& stars) {
+  const Sectors& sectors = stars.sample().sectors();
+  std::set<std::uint64_t> regions;
+  for (std::uint32_t p = 0; p < stars.size(); ++p)
+    for (int sector = 0; sector < sectors.Count(p); ++sector)
+      regions.insert(sectors.Piece(p, sector, 0));
+  regions.erase(0);  // no region
+  return {regions.begin(), regions.end()};
+}
+
+// Adds what FillCavities finds in a region.
+template <int K>
+void FillRegion(const Stars<K>& stars, const FillingRules& rules, std::uint64_t region,
+                FilledCavities* result, std::vector<typename Stars<K>::Simplex>* all) {
+  const Census<K> census(stars, region);
   std::vector<Cavity<K>> cavities;
   for (auto& part : PartDoubtful<K>(census)) cavities.emplace_back(census, rules, std::move(part));
   std::vector<std::uint8_t> filled(cavities.size());
   ParallelFor(cavities.size(), [&](std::size_t i) { filled[i] = cavities[i].Fill(); });
-  FilledCavities result;
-  result.inconsistent = census.doubtful.size();
-  result.cavities = cavities.size();
-  auto all = census.agreed;
+  result->inconsistent += census.doubtful.size();
+  result->cavities += cavities.size();
+  all->insert(all->end(), census.agreed.begin(), census.agreed.end());
   for (std::size_t i = 0; i < cavities.size(); ++i) {
     const Cavity<K>& cavity = cavities[i];
     if (filled[i]) {
-      ++result.filled;
-      result.filling += cavity.filling().size();
-      all.insert(all.end(), cavity.filling().begin(), cavity.filling().end());
+      ++result->filled;
+      result->filling += cavity.filling().size();
+      all->insert(all->end(), cavity.filling().begin(), cavity.filling().end());
     }
-    auto& ids = filled[i] ? result.tiled : result.unfilled;
+    auto& ids = filled[i] ? result->tiled : result->unfilled;
     ids.insert(ids.end(), cavity.vertices().begin(), cavity.vertices().end());
   }
+}
+
+}  // namespace
+
+template <int K>
+FilledCavities FillCavities(const Stars<K>& stars, const FillingRules& rules) {
+  FilledCavities result;
+  std::vector<typename Stars<K>::Simplex> all;
+  for (const std::uint64_t region : RegionsOf(stars))
+    FillRegion(stars, rules, region, &result, &all);
   for (auto* ids : {&result.tiled, &result.unfilled}) {
     std::sort(ids->begin(), ids->end());
     ids->erase(std::unique(ids->begin(), ids->end()), ids->end());
   }
   ParallelSort(all, std::less<>());
+  all.erase(std::unique(all.begin(), all.end()), all.end());
   result.simplices.reserve(all.size() * (K + 1));
   for (const auto& s : all) result.simplices.insert(result.simplices.end(), s.begin(), s.end());
   return result;

@@ -16,7 +16,8 @@ namespace stellate::core {
 // cancels on each facet. Such a chain covers each point as often as its boundary winds around it,
 // and that is once: it tiles the cavity. The search goes facet by facet, the one with the fewest
 // choices first, and tries simplices that more stars hold, and then fatter ones, first. At a wall
-// the cavity ends: what stars agree on there has one side.
+// the cavity ends: what stars agree on there has one side. Of an arrangement, each region has its
+// own cavities, which the walls between them part.
 //
 // The filled mesh is not the union of the stars, so that only the certificate can judge it.
 

@@ -17,13 +17,15 @@
 
 namespace stellate::core {
 
-// The stars' simplices, divided into those on which all stars agree and the doubtful ones.
+// The simplices of the stars in one region of an arrangement, or of all stars, divided into those
+// on which all these stars agree and the doubtful ones.
 template <int K>
 struct Census {
   using Simplex = typename Stars<K>::Simplex;
   using Facet = std::array<std::uint32_t, K>;
 
-  explicit Census(const Stars<K>& whole) : stars(whole) {
+  // `region`: as Sectors::Piece identifies it, for no walls.
+  explicit Census(const Stars<K>& whole, std::uint64_t of) : stars(whole), region(of) {
     const std::uint32_t n = stars.size();
     const std::size_t chunks = ChunkCount(n);
     std::vector<std::vector<Simplex>> owned(chunks), doubts(chunks);
@@ -54,11 +56,24 @@ struct Census {
     return std::binary_search(doubtful.begin(), doubtful.end(), s);
   }
 
+  // Returns the point's sector in the region; nothing if it has none there, or several.
+  std::optional<int> SectorOf(std::uint32_t p) const {
+    std::optional<int> found;
+    for (int sector = 0; sector < stars.sample().sectors().Count(p); ++sector) {
+      if (!IsHere(p, sector)) continue;
+      if (found) return std::nullopt;
+      found = sector;
+    }
+    return found;
+  }
+
   // Writes the agreed simplices on a facet and returns their number: two at most, as the facet is
   // an edge of a cell.
   int AgreedOn(const Facet& facet, Simplex (&found)[2]) const {
     const std::uint32_t p = facet[0];
-    const auto& cell = stars.cell(p);
+    const std::optional<int> sector = SectorOf(p);
+    if (!sector) return 0;
+    const auto& cell = stars.cell(p, *sector);
     int count = 0;
     Simplex s;
     for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
@@ -76,13 +91,14 @@ struct Census {
   // that the facet is on that face.
   std::optional<int> WallUnder(const Facet& facet) const {
     const std::uint32_t p = facet[0];
-    if (stars.sample().walls(p) == 0) return std::nullopt;
-    const auto& cell = stars.cell(p);
+    const std::optional<int> sector = SectorOf(p);
+    if (stars.sample().walls(p) == 0 || !sector) return std::nullopt;
+    const auto& cell = stars.cell(p, *sector);
     for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
       const auto simplex = stars.FaceSimplexOf(p, cell, v);
       if (simplex.fake || CountWalls(simplex.walls) != 1 || simplex.count != K) continue;
       if (std::equal(facet.begin(), facet.end(), simplex.ids.begin()) &&
-          IsConsistent<K>(stars, p, v))
+          IsConsistent<K>(stars, p, v, *sector))
         return std::countr_zero(simplex.walls);
     }
     return std::nullopt;
@@ -96,19 +112,27 @@ struct Census {
   }
 
   const Stars<K>& stars;
+  const std::uint64_t region;
   std::vector<Simplex> agreed, doubtful, all_doubts;
 
  private:
+  bool IsHere(std::uint32_t p, int sector) const {
+    return stars.sample().sectors().Piece(p, sector, 0) == region;
+  }
+
   void Survey(std::uint32_t p, std::vector<Simplex>& owned, std::vector<Simplex>& doubts) const {
-    const auto& cell = stars.cell(p);
-    const Folds<K> folds(stars, p);
-    Simplex s;
-    for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
-      if (!stars.SimplexOf(p, cell, v, &s)) continue;
-      if (!IsConsistent<K>(stars, p, v) || folds.IsFolded(v))
-        doubts.push_back(s);
-      else if (s[0] == p)
-        owned.push_back(s);
+    for (int sector = 0; sector < stars.sample().sectors().Count(p); ++sector) {
+      if (!IsHere(p, sector)) continue;
+      const auto& cell = stars.cell(p, sector);
+      const Folds<K> folds(stars, p, sector);
+      Simplex s;
+      for (std::size_t v = 0; v < cell.vertex_count(); ++v) {
+        if (!stars.SimplexOf(p, cell, v, &s)) continue;
+        if (!IsConsistent<K>(stars, p, v, sector) || folds.IsFolded(v))
+          doubts.push_back(s);
+        else if (s[0] == p)
+          owned.push_back(s);
+      }
     }
   }
 };

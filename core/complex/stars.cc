@@ -38,29 +38,6 @@ std::vector<std::uint32_t> Stars<K>::Simplices() const {
 }
 
 template <int K>
-std::vector<std::int8_t> Stars<K>::LabelsOf(const std::vector<std::uint32_t>& simplices) const {
-  std::vector<std::int8_t> labels;
-  if (sample_.sectors().labels().empty()) return labels;
-  labels.resize(simplices.size() / (K + 1));
-  ParallelFor(labels.size(), [&](std::size_t i) {
-    const std::uint32_t* const ids = simplices.data() + i * (K + 1);
-    const std::uint32_t p = ids[0];
-    Simplex simplex;
-    const auto holds = [&](int sector) {
-      const Cell& cell = this->cell(p, sector);
-      for (std::size_t v = 0; v < cell.vertex_count(); ++v)
-        if (SimplexOf(p, cell, v, &simplex) && std::equal(simplex.begin(), simplex.end(), ids))
-          return true;
-      return false;
-    };
-    int sector = sample_.sectors().Count(p) - 1;
-    while (sector > 0 && !holds(sector)) --sector;
-    labels[i] = static_cast<std::int8_t>(sample_.sectors().Label(p, sector));
-  });
-  return labels;
-}
-
-template <int K>
 double Stars<K>::HalfSpace(std::uint32_t p, std::size_t facet, double* normal, int sector) const {
   const Cell& cell = this->cell(p, sector);
   if constexpr (K == 2) {

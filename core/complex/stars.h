@@ -102,9 +102,6 @@ class Stars {
   }
   // Simplices in the star of their lowest vertex: K+1 ids each, and how many there are.
   std::vector<std::uint32_t> Simplices() const;
-  // Returns the labels of simplices, K+1 ascending ids each, in the stars of their lowest vertices;
-  // empty without labels.
-  std::vector<std::int8_t> LabelsOf(const std::vector<std::uint32_t>& simplices) const;
   std::uint64_t simplex_count() const { return simplex_count_; }
 
   // Writes the k-simplex dual to vertex v of p's cell. Returns false if a facet of it is fake or a

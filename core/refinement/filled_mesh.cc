@@ -17,8 +17,6 @@ template <int K>
 void FilledMesh<K>::Fill(const Stars<K>& stars, const ResolvedCriteria& criteria) {
   Clear();
   if (K < kFirstFilled || criteria.centre_rule != CentreRule::kCommonCentre) return;
-  // A cavity may reach from one label into another, and a tiling would not keep what is between.
-  if (!stars.sample().sectors().labels().empty()) return;
   cavities_ = FillCavities<K>(
       stars, {criteria.epsilon, criteria.radius_edge_bound, criteria.shape.sliver_bound});
 }
@@ -29,7 +27,8 @@ bool FilledMesh<K>::Resolves(const Stars<K>& stars, std::uint32_t star,
   if (cavities_.cavities == 0 || violation.fake || violation.walls != 0 ||
       std::binary_search(cavities_.unfilled.begin(), cavities_.unfilled.end(), star))
     return false;
-  return violation.rule == Rule::kInconsistent || !IsConsistent<K>(stars, star, violation.vertex);
+  return violation.rule == Rule::kInconsistent ||
+         !IsConsistent<K>(stars, star, violation.vertex, violation.sector);
 }
 
 template <int K>

@@ -10,6 +10,7 @@
 #include "core/boundary/boundary_mesh.h"
 #include "core/boundary/faces.h"
 #include "core/complex/consistency.h"
+#include "core/complex/labels.h"
 
 namespace stellate::core {
 namespace {
@@ -30,10 +31,15 @@ double MaxLiveNorm2(const Stars<K>& stars, std::uint32_t p) {
 
 template <int K>
 double MaxAgreedNorm2(const Stars<K>& stars, std::uint32_t p) {
-  const auto& cell = stars.cell(p);
   double most = 0;
-  for (std::size_t v = 0; v < cell.vertex_count(); ++v)
-    if (cell.norm2(v) > most && IsConsistent<K>(stars, p, v)) most = cell.norm2(v);
+  for (int sector = 0; sector < stars.sample().sectors().Count(p); ++sector) {
+    const auto& cell = stars.cell(p, sector);
+    for (std::size_t v = 0; v < cell.vertex_count(); ++v)
+      if (cell.norm2(v) > most &&
+          stars.sample().sectors().Piece(p, sector, WallsAt<K>(cell, v)) != 0 &&
+          IsConsistent<K>(stars, p, v, sector))
+        most = cell.norm2(v);
+  }
   return most;
 }
 
@@ -143,7 +149,7 @@ std::optional<BoundaryOfMesh> BoundaryOf(const Engine<K>& engine) {
   }
   if (const LabelTable& labels = stars.sample().sectors().labels(); !labels.empty()) {
     boundary.table = &labels;
-    boundary.labels = stars.LabelsOf(engine.Simplices());
+    boundary.labels = LabelsOf(stars, engine.Simplices());
     for (std::uint32_t p = 0; p < stars.size(); ++p) {
       boundary.signs.push_back(stars.sample().sectors().Signs(p));
       boundary.one_sided.push_back(stars.sample().sectors().Count(p) == 1);

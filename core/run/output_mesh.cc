@@ -2,6 +2,8 @@
 
 #include <utility>
 
+#include "core/complex/labels.h"
+
 namespace stellate::core {
 
 template <int K>
@@ -24,7 +26,7 @@ void OutputMesh<K>::Add(typename Engine<K>::Change change, MeshDelta* delta) con
   if (boundary_) return;
   delta->added = std::move(change.added);
   delta->removed = std::move(change.removed);
-  delta->labels = stars.LabelsOf(delta->added);
+  delta->labels = LabelsOf(stars, delta->added);
 }
 
 template <int K>
@@ -40,7 +42,7 @@ std::vector<std::uint32_t> OutputMesh<K>::Simplices() const {
 
 template <int K>
 std::vector<std::int8_t> OutputMesh<K>::Labels() const {
-  return boundary_ ? boundary_->Labels() : engine_.stars().LabelsOf(engine_.Simplices());
+  return boundary_ ? boundary_->Labels() : LabelsOf(engine_.stars(), engine_.Simplices());
 }
 
 STELLATE_INSTANTIATE_CLASS(OutputMesh)

@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "core/complex/labels.h"
 #include "tests/core/support/in_process_run.h"
 #include "tests/core/support/samples.h"
 
@@ -110,6 +111,75 @@ void ExpectClosedButForUnfilled(const FilledCase& c) {
     EXPECT_LE(count, 2);
     EXPECT_TRUE(count == 2 || at_unfilled);
   }
+}
+
+// T^3 in two labels: of a wall across the first circle, by a sample whose points near it lie on it.
+class TwoLabels {
+ public:
+  static constexpr double kEpsilon = 0.8;
+
+  TwoLabels() : stars_(6, kEpsilon, {4 * kEpsilon, CentreRule::kTangentSpace}, LabelTable({1, 2})) {
+    const auto manifold = Make("flat-torus:3");
+    Specification spec = SpecificationFor(*manifold, kEpsilon);
+    spec.criteria.centre_rule = CentreRule::kCommonCentre;
+    Eigen::MatrixXd points = Drive(spec, *manifold).mesher->Points();
+    for (auto point : points.colwise())
+      if (std::abs(point[0]) < 0.4 * kEpsilon) {
+        point[1] = std::copysign(std::hypot(point[0], point[1]), point[1]);
+        point[0] = 0;
+      }
+    FramedPoints sample;
+    sample.d = 6;
+    sample.k = 3;
+    sample.Append(points, manifold->TangentBasis(points));
+    for (std::uint32_t p = 0; p < sample.size(); ++p) {
+      const double* const point = sample.Point(p);
+      double outward[3] = {};
+      for (int a = 0; a < 3; ++a)
+        outward[a] = point[0] == 0 ? -sample.Tangent(p)[static_cast<std::ptrdiff_t>(a) * 6] : 0;
+      stars_.Add(point, sample.Tangent(p), Stars<3>::kNone, point[0] == 0 ? 1 : 0, outward,
+                 point[0] > 0 ? 1 : 0);
+    }
+    stars_.Commit();
+  }
+
+  const Stars<3>& stars() const { return stars_; }
+  bool AreOnTheWall(const std::array<std::uint32_t, 3>& facet) const {
+    return std::all_of(facet.begin(), facet.end(),
+                       [&](std::uint32_t p) { return stars_.sample().walls(p) != 0; });
+  }
+
+ private:
+  Stars<3> stars_;
+};
+
+TEST(CavitiesTest, OfARegionEndAtItsWalls) {
+  const TwoLabels sample;
+  const FilledCavities filled = FillCavities<3>(sample.stars(), RulesAt(1.5 * TwoLabels::kEpsilon));
+  EXPECT_GT(filled.filled, 0u);
+  EXPECT_GT(filled.filling, 0u);
+  const std::vector<std::int8_t> labels = LabelsOf(sample.stars(), filled.simplices);
+  std::vector<std::uint32_t> of_label[2];
+  for (std::size_t s = 0; s < labels.size(); ++s) {
+    const auto* const ids = filled.simplices.data() + 4 * s;
+    of_label[labels[s] - 1].insert(of_label[labels[s] - 1].end(), ids, ids + 4);
+    for (int i = 0; i < 4; ++i) {
+      const double x = sample.stars().sample().Point(ids[i])[0];
+      EXPECT_TRUE(labels[s] == 1 ? x <= 0 : x >= 0);
+    }
+  }
+  int on_the_wall = 0;
+  for (const auto& simplices : of_label) {
+    for (const auto& [facet, count] : FacetsOf<3>(simplices)) {
+      const bool at_unfilled = std::all_of(facet.begin(), facet.end(), [&](std::uint32_t v) {
+        return std::binary_search(filled.unfilled.begin(), filled.unfilled.end(), v);
+      });
+      EXPECT_LE(count, 2);
+      EXPECT_TRUE(count == 2 || at_unfilled || sample.AreOnTheWall(facet));
+      on_the_wall += count == 1 && sample.AreOnTheWall(facet);
+    }
+  }
+  EXPECT_GT(on_the_wall, 0);
 }
 
 TEST(CavitiesTest, AreClosedByTheirFilling) {
