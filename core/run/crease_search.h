@@ -2,22 +2,25 @@
 
 #include <cstddef>
 #include <optional>
+#include <string>
+#include <utility>
 #include <vector>
 
 #include "core/base/instantiate.h"
 #include "core/refinement/engine.h"
 #include "core/run/crease_probe.h"
 #include "core/run/crease_watch.h"
+#include "core/run/dimension_probe.h"
 
 namespace stellate::core {
 
-// Finds out that M is not smooth: by queries that go with those of a round, and before a run gives
-// up.
+// Finds out that M is not smooth, or has another dimension: by queries that go with those of a
+// round, and before a run gives up.
 //
 //   search.Watch(engine);                         // once a round
 //   if (search.is_asking()) search.Ask(&blocks);  // with the round's queries
 //   search.Absorb(answers);
-//   if (search.crease()) ...
+//   verdict += search.Describe();
 template <int K>
 class CreaseSearch {
  public:
@@ -33,12 +36,17 @@ class CreaseSearch {
   // Call it once every rule holds. Forgets edges that were not probed to their end.
   void Stop();
 
-  bool is_asking() const { return probe_.is_asking(); }
-  const std::optional<Crease>& crease() const { return probe_.crease(); }
+  // Looks at a few vertices for more dimensions, besides.
+  void ProbeDimension(const Engine<K>& engine);
 
-  // Adds its block of queries. REQUIRES: is_asking().
+  bool is_asking() const { return probe_.is_asking() || dimension_.is_asking(); }
+  const std::optional<Crease>& crease() const { return probe_.crease(); }
+  // Says what was found and what to do, for people; "" if nothing was.
+  std::string Describe() const;
+
+  // Adds its blocks of queries. REQUIRES: is_asking().
   void Ask(std::vector<QueryBlock>* blocks);
-  // Takes its block of the answers, if it has asked.
+  // Takes its blocks of the answers, if it has asked.
   void Absorb(const std::vector<AnswerBlock>& answers);
 
  private:
@@ -46,8 +54,10 @@ class CreaseSearch {
   bool is_domain_;  // of R^d, which bends nowhere
   CreaseProbe probe_;
   CreaseWatch watch_;
-  WalkedEdges walked_;                // edges that rounds have probed
-  std::optional<std::size_t> block_;  // the probe's, among the open ones
+  DimensionProbe dimension_;
+  WalkedEdges walked_;  // edges that rounds have probed
+  // Those that have asked, and the block of each among the open ones.
+  std::vector<std::pair<QuerySource*, std::size_t>> open_;
 };
 
 STELLATE_DECLARE_CLASS(CreaseSearch)

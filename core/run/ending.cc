@@ -128,6 +128,15 @@ std::string DescribeCrease(const Crease& crease) {
       "a cone has, is cut away by a wall: g >= 0 outside of a ball around it");
 }
 
+std::string DescribeOtherDimension(const OtherDimension& other, int k) {
+  return Message("the manifold has dimension ", other.dimension,
+                 other.is_at_least ? " at least" : "", " near ", NamePoint(other.point),
+                 " and at all of ", other.places,
+                 " vertices that were looked at, but it was "
+                 "declared as ",
+                 k, "-dimensional; no epsilon will do. Correct the dimension");
+}
+
 template <int K>
 void ExplainSharpest(const Engine<K>& engine, bool is_stalled, Certificate* certificate) {
   certificate->sharpest = Sharpest<K>(engine.stars());

@@ -8,6 +8,7 @@
 #include "core/refinement/engine.h"
 #include "core/report.h"
 #include "core/run/crease_probe.h"
+#include "core/run/dimension_probe.h"
 
 namespace stellate::core {
 
@@ -20,6 +21,9 @@ void DescribeUnfinished(const Engine<K>& engine, double epsilon, bool is_smooth,
 
 // Says what a crease is, where, and what to do, for people.
 std::string DescribeCrease(const Crease& crease);
+
+// Says where M has other dimensions than the k that were declared, for people.
+std::string DescribeOtherDimension(const OtherDimension& other, int k);
 
 // Records where walls meet at the smallest angle. If that is below SafeAngle, also adds a sentence,
 // as a warning to a certified mesh, else to the verdict: first of all, as the likely cause, if the

@@ -171,7 +171,7 @@ template <int K>
 void Scheduler<K>::Plan() {
   const std::unique_ptr<Sampler<K>> finished = sample_.TakeFinished();
   noticed_.box.Look(engine_.stars().sample().points().data(), engine_.stars().size());
-  if (engine_.is_full()) return Finish(Termination::kVertexBudget);
+  if (engine_.is_full()) return End(Termination::kVertexBudget);
   if (noticed_.box.has_left()) return Finish(Termination::kNoProgress);
   auto targets = engine_.Plan();
   if (!targets) return LeaveFaces();

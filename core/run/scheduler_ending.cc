@@ -1,5 +1,6 @@
 // How a run ends, and what it reports of that.
 
+#include <string>
 #include <utility>
 
 #include "core/base/message.h"
@@ -9,16 +10,22 @@
 
 namespace stellate::core {
 
-// Ends the run, once it is known whether a crease keeps it from a better end.
+// Ends the run, once it is known whether a crease, or another dimension of M, keeps it from a
+// better end.
 template <int K>
 void Scheduler<K>::End(Termination termination) {
   const bool may_be_creased = K < spec_.ambient_dimension && !noticed_.box.has_left();
+  const bool is_coarse =
+      source_.certifier() && source_.certifier()->certificate().epsilon_over_reach > kCoarse;
   if (may_be_creased && !creases_.is_asking()) {
     if (termination == Termination::kNoProgress)
       creases_.ProbeFaults(engine_);
-    else if (source_.certifier() && source_.certifier()->certificate().epsilon_over_reach > kCoarse)
+    else if (is_coarse)
       creases_.ProbeAll(engine_.stars());
   }
+  if (may_be_creased && (termination == Termination::kNoProgress ||
+                         termination == Termination::kVertexBudget || is_coarse))
+    creases_.ProbeDimension(engine_);
   if (!may_be_creased || !creases_.is_asking()) return Finish(termination);
   end_.pending = termination;
 }
@@ -46,12 +53,13 @@ template <int K>
 void Scheduler<K>::DescribeEnding() {
   const Termination termination = end_.outcome->termination;
   Certificate& certificate = end_.outcome->certificate;
+  const std::string flaw = creases_.Describe();
   if (termination == Termination::kConverged) {
     certificate = source_.certifier()->certificate();
     WarnOfCompromises<K>(engine_, spec_.epsilon, &certificate);
     // It may be the cause of all other problems.
-    if (creases_.crease()) {
-      certificate.verdict = Message("Not certified: ", DescribeCrease(*creases_.crease()));
+    if (!flaw.empty()) {
+      certificate.verdict = "Not certified: " + flaw;
       certificate.only_too_coarse = false;
     }
   } else {
@@ -61,32 +69,33 @@ void Scheduler<K>::DescribeEnding() {
                                     : " before every rule held");
     if (!end_.outcome->failure.message.empty())
       certificate.verdict += ": " + end_.outcome->failure.message;
-    if (termination == Termination::kVertexBudget)
+    if (termination == Termination::kVertexBudget && !flaw.empty())
+      certificate.verdict += ": " + flaw;
+    else if (termination == Termination::kVertexBudget)
       certificate.verdict += ": allow more vertices (max_vertices), or take a larger epsilon";
     if (termination == Termination::kRoundBudget)
       certificate.verdict += ": allow more rounds (max_rounds)";
     // A client that cancels a large mesh does not want to wait for its description.
     if (termination != Termination::kCancelled && termination != Termination::kOracleFailed)
-      DescribeUnfinished<K>(engine_, spec_.epsilon, !creases_.crease(), &certificate);
+      DescribeUnfinished<K>(engine_, spec_.epsilon, flaw.empty(), &certificate);
     if (termination == Termination::kNoProgress)
       certificate.verdict +=
           "; " + (noticed_.box.has_left() ? noticed_.box.WhyStopped()
-                  : creases_.crease()
-                      ? DescribeCrease(*creases_.crease())
-                      : WhatIsLeft<K>(engine_, certificate.inconsistent_simplices) +
-                            noticed_.boundary.Describe(engine_.stars().sample().d()));
+                  : !flaw.empty()         ? flaw
+                                  : WhatIsLeft<K>(engine_, certificate.inconsistent_simplices) +
+                                        noticed_.boundary.Describe(engine_.stars().sample().d()));
     // A front that never closes may be where the manifold ends.
     const bool spent =
         termination == Termination::kVertexBudget || termination == Termination::kRoundBudget;
     if (engine_.boundary().policy().MayEndUndeclared() && !noticed_.box.has_left() &&
-        !creases_.crease() &&
+        flaw.empty() &&
         (termination == Termination::kNoProgress ||
          (spent && !noticed_.boundary.offsets().empty())))
       certificate.verdict += Message(". ", kDeclareWalls);
   }
   if (interruption_.raised()) return;  // the mesh was never reported
   noticed_.box.Warn(&certificate);
-  if (termination == Termination::kNoProgress && !creases_.crease())
+  if (termination == Termination::kNoProgress && flaw.empty())
     ExplainInactiveWall<K>(engine_, spec_.walls, &certificate);
   // The one that explains the most leads in the end.
   ExplainSharpest<K>(engine_, termination == Termination::kNoProgress, &certificate);

@@ -15,7 +15,7 @@
 namespace stellate::server {
 
 // What a journal's records hold. A change of any of these is a new kJournalVersion.
-inline constexpr std::uint32_t kJournalVersion = 20;
+inline constexpr std::uint32_t kJournalVersion = 21;
 
 // Where a record belongs. Numbers are stored: they stay as they are.
 enum class RecordKind : std::int64_t {
