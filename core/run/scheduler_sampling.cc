@@ -41,7 +41,7 @@ void Scheduler<K>::InsertSeeds() {
   const Eigen::Index count = answers.points.cols();
   const auto found = std::count(answers.found.begin(), answers.found.end(), 1);
   noticed_.covers_box = spec_.cover_box && found == count;
-  if (found == 0) return Fail({StatusCode::kNoSeeds, WhyNoSeeds(spec_, count)});
+  if (found == 0) return Fail({StatusCode::kNoSeeds, WhyNoSeeds(spec_, answers)});
   checks_.repeat.Sample(answers);
   std::vector<std::uint8_t> used(static_cast<std::size_t>(count), 0);
   if (sample_.Begin(engine_, spec_, answers, &used)) {

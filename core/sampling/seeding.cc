@@ -43,15 +43,20 @@ Eigen::MatrixXd SeedsOf(const Specification& spec) {
   return seeds;
 }
 
-std::string WhyNoSeeds(const Specification& spec, Eigen::Index count) {
+std::string WhyNoSeeds(const Specification& spec, const AnsweredPoints& answers) {
+  const auto first = std::find(answers.answered.begin(), answers.answered.end(), 1);
+  if (first != answers.answered.end()) {
+    const auto count = std::count(first, answers.answered.end(), 1);
+    const Eigen::VectorXd point = answers.points.col(first - answers.answered.begin());
+    return Message(count, " points of the manifold were found, the first ", NamePoint(point),
+                   ", but at none of them does it look ", spec.dimension,
+                   "-dimensional: points around it have other closest points than that, or none. "
+                   "Correct the dimension, or the closest points");
+  }
   const char* const tried =
       spec.seeds.cols() > 0 ? " seeds were" : " points of the bounding box were";
-  std::string message = Message("no seed has a closest point on the manifold: ", count, tried,
-                                " tried; give seeds near the manifold, or a box that holds it");
-  if (!spec.oracle.tangent_basis)
-    message += Message("; seeds where the manifold does not look ", spec.dimension,
-                       "-dimensional count as not found");
-  return message;
+  return Message("no seed has a closest point on the manifold: ", answers.answered.size(), tried,
+                 " tried; give seeds near the manifold, or a box that holds it");
 }
 
 std::string WhyNothingInside(const Specification& spec, const AnsweredPoints& answers) {

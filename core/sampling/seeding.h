@@ -12,8 +12,8 @@ namespace stellate::core {
 // that cover the box, or random points of it.
 Eigen::MatrixXd SeedsOf(const Specification& spec);
 
-// Explains that none of `count` seeds was found, for people.
-std::string WhyNoSeeds(const Specification& spec, Eigen::Index count);
+// Explains that no seed was found, or no tangent space at one, for people.
+std::string WhyNoSeeds(const Specification& spec, const AnsweredPoints& answers);
 
 // Explains, for a manifold with boundary, that no seed's closest point is in M, for people: no
 // point was found, or the box lies beside M, or the walls leave nothing of M^.

@@ -4,6 +4,7 @@
 
 #include <string>
 #include <tuple>
+#include <utility>
 
 #include "tests/core/support/in_process_run.h"
 
@@ -51,6 +52,16 @@ INSTANTIATE_TEST_SUITE_P(Manifolds, OtherDimensions,
                                            std::tuple{"sphere:2", 1, 0.3, "2"},
                                            std::tuple{"so3", 2, 0.5, "3"},
                                            std::tuple{"flat-torus:3", 2, 0.5, "3"}));
+
+TEST(OtherDimension, IsNamedWhereNoSeedHasSoManyDirections) {
+  for (const auto& [manifold, declared] : {std::pair{"torus-knot:2:9", 2}, {"flat-torus:2", 3}}) {
+    const std::string verdict = CertificateOf(manifold, declared, 0.3).verdict;
+    EXPECT_TRUE(Mentions(verdict, "points of the manifold were found, the first (") &&
+                Mentions(verdict, "but at none of them does it look " + std::to_string(declared) +
+                                      "-dimensional"))
+        << verdict;
+  }
+}
 
 // It bends, comes near to itself, or is far too fine a thing for epsilon, but its dimension is
 // right.
