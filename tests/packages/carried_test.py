@@ -27,7 +27,9 @@ class Carried(unittest.TestCase):
         self.assertIn("packaging/grpc/build build/grpc", read("packaging/build"))
         self.assertIn("cmake --preset package", read("packaging/build"))
         self.assertIn("packaging/build programs", read("packaging/deb"))
-        self.assertIn('"packaging" / "build", "programs"', read("packaging/wheel"))
+        self.assertIn('"packaging" / "build", "programs"', read("packaging/bundle.py"))
+        for carries in ("packaging/wheel", "packaging/npm-server"):
+            self.assertRegex(read(carries), r"from bundle import .*\bfill\b")
         dockerfile = read("docker/Dockerfile")
         self.assertLess(
             dockerfile.index("RUN packaging/grpc/build build/grpc"),

@@ -2,6 +2,7 @@
 import { type ChildProcess, spawn } from "node:child_process";
 import { once } from "node:events";
 import { accessSync, constants, existsSync, mkdtempSync, readdirSync, rmSync } from "node:fs";
+import { createRequire } from "node:module";
 import { tmpdir } from "node:os";
 import { delimiter, dirname, join } from "node:path";
 import { createInterface } from "node:readline";
@@ -36,7 +37,21 @@ function inSourceTree(): string[] {
   return names.map((name) => join(build, name, "bin", "stellated"));
 }
 
-/** The server binary: $STELLATED, else build/ of the source tree, else PATH. */
+/** Of the package that carries a server for this machine, where it is installed. */
+function inPackage(): string[] {
+  const name = `stellate-server-${process.platform}-${process.arch}`;
+  try {
+    const manifest = createRequire(import.meta.url).resolve(`${name}/package.json`);
+    return [join(dirname(manifest), "bin", "stellated")];
+  } catch {
+    return [];
+  }
+}
+
+/**
+ * The server binary: $STELLATED, else that of the package stellate-server-PLATFORM-PROCESSOR, else
+ * build/ of the source tree, else PATH.
+ */
 export function findStellated(): string {
   const named = process.env.STELLATED;
   const folders = (process.env.PATH ?? "").split(delimiter);
@@ -46,11 +61,12 @@ export function findStellated(): string {
     if (path) return path;
     throw new ServerNotFound(`$STELLATED is ${named}, which is not a program that can be run`);
   }
-  const path = [...inSourceTree(), ...onPath("stellated")].find(runs);
+  const path = [...inPackage(), ...inSourceTree(), ...onPath("stellated")].find(runs);
   if (path) return path;
   throw new ServerNotFound(
     "no server was given and no stellated found to start: pass server: 'host:port', or set " +
-      "$STELLATED to the binary, or put it on PATH, or build it (clients/quickstart does)",
+      "$STELLATED to the binary, or put it on PATH, or build it (clients/quickstart does), or " +
+      `install stellate-server-${process.platform}-${process.arch} (packaging/npm-server makes it)`,
   );
 }
 
