@@ -19,6 +19,10 @@ namespace stellate::core {
 
 // The simplices of the stars in one region of an arrangement, or of all stars, divided into those
 // on which all these stars agree and the doubtful ones.
+//
+//   const Census<K> census(stars, region);
+//   for (const auto& cavity : PartDoubtful(census)) ...  // fill it: core/complex/cavities.h
+//   output.insert(output.end(), census.agreed.begin(), census.agreed.end());
 template <int K>
 struct Census {
   using Simplex = typename Stars<K>::Simplex;
@@ -113,13 +117,18 @@ struct Census {
 
   const Stars<K>& stars;
   const std::uint64_t region;
-  std::vector<Simplex> agreed, doubtful, all_doubts;
+  // Sorted, each once: in all stars of its vertices; in some of them, or folded over its
+  // neighbours.
+  std::vector<Simplex> agreed, doubtful;
+  std::vector<Simplex> all_doubts;  // doubtful ones, once for each star that has them
 
  private:
   bool IsHere(std::uint32_t p, int sector) const {
     return stars.sample().sectors().Piece(p, sector, 0) == region;
   }
 
+  // Adds what a star agrees on to `owned`, if p is the lowest vertex, which one star of each
+  // simplex has, and the rest to `doubts`.
   void Survey(std::uint32_t p, std::vector<Simplex>& owned, std::vector<Simplex>& doubts) const {
     for (int sector = 0; sector < stars.sample().sectors().Count(p); ++sector) {
       if (!IsHere(p, sector)) continue;

@@ -12,11 +12,17 @@ namespace stellate::core {
 
 // The inner loops of simplex.h, for callers that measure very many simplices of one kind: if j and
 // d are constants they unroll, and nothing is allocated. The numbers are the same.
+//
+//   SimplexFrame frame;                        // once, with memory for j x d numbers
+//   TakeFrame(vertices, 3, 4, frame);          // of each tetrahedron in R^4
+//   if (FrameCircumradius(frame, 3) > bound) ... MeasureFramed(vertices, 3, 4, frame)
 
 // A height below this share of the diameter is rounding error: the simplex is degenerate.
 inline constexpr double kDegenerateHeight = 1e-14;
 
-// FrameSimplex of j + 1 vertices. REQUIRES: frame.directions holds j x d numbers.
+// FrameSimplex of j + 1 vertices: an orthonormal basis of their span by Gram-Schmidt, which takes
+// the edge that is farthest from the span so far. Edges keep their coordinates in that basis, and
+// heights are the lengths that each adds. REQUIRES: frame.directions holds j x d numbers.
 [[gnu::always_inline]] inline void TakeFrame(SimplexVertices vertices, int j, int d,
                                              SimplexFrame& frame) {
   double* const e = frame.directions.data();
@@ -63,7 +69,8 @@ inline constexpr double kDegenerateHeight = 1e-14;
   }
 }
 
-// The circumcentre c of vertex 0 and the edges r_i, lower triangular: 2 r_i . c = |r_i|^2.
+// Returns the circumradius, infinite for a degenerate simplex: |c|, where 2 r_i . c = |r_i|^2 for
+// the edges r_i from vertex 0, whose coordinates in the frame are lower triangular.
 [[gnu::always_inline]] inline double FrameCircumradius(const SimplexFrame& frame, int j) {
   if (frame.rank < j) return std::numeric_limits<double>::infinity();
   double c[kMaxSimplexDimension];

@@ -19,13 +19,19 @@ static_assert(std::endian::native == std::endian::little, "records are copied, n
 // How records are laid out: little-endian numbers of 8 bytes, strings and arrays after their sizes.
 inline constexpr std::size_t kWord = 8;
 
-// Changed by any change of a word. Guards against disks, not against forgers.
+// A checksum of words that changes with any one of them. Guards against disks, not against forgers.
+//
+//   RecordDigest digest;
+//   digest.Add(points);
+//   if (digest.value() != recorded) ...  // the record is damaged
 class RecordDigest {
  public:
   void Add(std::uint64_t word) {
     state_ = (state_ ^ word) * 0xff51afd7ed558ccdu;
     state_ ^= state_ >> 32;
   }
+  // The last bytes make a word of their own, filled up by zeros; the size, which is added first,
+  // tells them apart.
   void Add(const void* data, std::size_t bytes) {
     Add(bytes);
     const char* at = static_cast<const char*>(data);
@@ -49,7 +55,21 @@ class RecordDigest {
   std::uint64_t state_ = 0x9e3779b97f4a7c15u;
 };
 
-// Both take the same fields in the same order, so that one function lays out either way.
+// RecordWriter and RecordReader have the same members, so that one function lists the fields of a
+// record, once and in their order, for both directions.
+//
+//   template <typename Record, typename Fields>
+//   void LayOut(Record& record, Fields& fields) {
+//     fields.Number(record.round);
+//     fields.Numbers(record.points);
+//   }
+//   RecordWriter writer;
+//   LayOut(record, writer);
+//   file.Append(writer.Take());
+//
+//   RecordReader reader(bytes);
+//   LayOut(record, reader);
+//   if (!reader.Complete()) ...  // damaged, or of another version
 class RecordWriter {
  public:
   template <typename T>
@@ -85,11 +105,13 @@ class RecordWriter {
     else
       Numbers(array);
   }
+  // A value that may be missing, after whether it is there.
   template <typename T>
   void Maybe(const std::optional<T>& value) {
     Number(value.has_value());
     if (value) Number(*value);
   }
+  // Whether a part follows that not every record has: `if (fields.Has(x != nullptr)) ...`.
   bool Has(bool value) {
     Number(value);
     return value;
@@ -107,6 +129,8 @@ class RecordWriter {
   std::string out_;
 };
 
+// Reads what RecordWriter wrote. Bytes that are no such record leave values empty and good() false:
+// a caller asks once, at the end. Sizes are believed as far as there are bytes.
 class RecordReader {
  public:
   explicit RecordReader(std::string_view in) : in_(in) {}
@@ -179,7 +203,9 @@ class RecordReader {
     return has && good_;
   }
 
+  // Whether all fields so far were there.
   bool good() const { return good_; }
+  // Whether all were there, and nothing follows them.
   bool Complete() const { return good_ && in_.empty(); }
 
  private:
