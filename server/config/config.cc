@@ -6,7 +6,7 @@
 #include "server/config/collector_url.h"
 #include "server/config/listen_address.h"
 #include "server/config/settings.h"
-#include "server/memory/machine_memory.h"
+#include "server/memory/machine.h"
 
 namespace stellate::server {
 namespace {
@@ -72,6 +72,7 @@ Status Validate(const Config& config) {
 }
 
 Config WithDefaults(Config config) {
+  if (config.max_processors == 0) config.max_processors = MachineProcessors();
   if (config.max_memory_bytes == 0) config.max_memory_bytes = MachineBytes() / 4 * 3;
   if (config.owner_memory_bytes == 0) config.owner_memory_bytes = config.max_memory_bytes / 2;
   if (config.owner_meshes == 0) config.owner_meshes = config.max_meshes;

@@ -28,6 +28,7 @@ struct Config {
 
   // Of the server.
   std::uint64_t max_meshes = 64;        // running at a time
+  std::uint64_t max_processors = 0;     // that compute; 0: WithDefaults says
   std::uint64_t max_memory_bytes = 0;   // of all meshes, estimated; 0: WithDefaults says
   std::uint64_t max_journal_bytes = 0;  // 0: what the disk holds
   std::uint64_t max_message_bytes = std::uint64_t{4} << 20;

@@ -11,4 +11,8 @@ namespace stellate::server {
 // is read (/proc/self/cgroup, /proc/self/mountinfo, and where they say that groups are mounted).
 std::optional<std::uint64_t> CgroupMemoryLimit(const std::string& root = "");
 
+// The least number of processors that any of them lets it use in the mean, as 1.5. Nothing where
+// none has a quota.
+std::optional<double> CgroupProcessors(const std::string& root = "");
+
 }  // namespace stellate::server

@@ -14,7 +14,7 @@
 #include <utility>
 
 #include "server/base/version.h"
-#include "server/memory/machine_memory.h"
+#include "server/memory/machine.h"
 
 namespace stellate::server {
 namespace {

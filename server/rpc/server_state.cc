@@ -1,7 +1,6 @@
 #include "server/rpc/server_state.h"
 
 #include <chrono>
-#include <thread>
 #include <utility>
 
 namespace stellate::server {
@@ -25,7 +24,7 @@ ServerState::ServerState(const Config& config, Session::MesherFactory factory)
       memory(std::make_shared<MemoryBudget>(ToMemoryLimits(config))),
       stream_memory(
           std::make_shared<MemoryBudget>(ToMemoryLimits(config), MemoryBudget::Of::kStreams)),
-      turns(std::make_shared<Turns>(std::thread::hardware_concurrency())),
+      turns(std::make_shared<Turns>(config.max_processors)),
       store(ToStoreLimits(config), std::move(factory)) {
   memory->MakeRoomBy([this] { return store.UnloadHistories(); });
 }
@@ -47,6 +46,7 @@ void ApplyServerPolicy(ServerState& state, SessionOptions* options) {
   options->policy.dispatch.chunk_bytes = ChunkBytes(config);
   options->policy.dispatch.max_in_flight = config.max_in_flight;
   options->policy.dispatch.check_share = config.check_share;
+  options->policy.execution.threads = static_cast<int>(config.max_processors);
   options->policy.max_workers = config.max_workers;
   options->policy.max_watchers = config.max_watchers;
   options->ports.observer = state.metrics.observer();

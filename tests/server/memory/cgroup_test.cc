@@ -6,6 +6,8 @@
 #include <filesystem>
 #include <fstream>
 
+#include "server/memory/machine.h"
+
 namespace stellate::server {
 namespace {
 
@@ -99,6 +101,36 @@ TEST_F(CgroupTest, Version1OfAContainerThatKnowsItsPathOnTheHost) {
         "cache 12\nrss 4\nhierarchical_memory_limit 500\ntotal_cache 1\n");
   EXPECT_EQ(CgroupMemoryLimit(root_), 500u) << "of a group outside, which cannot be seen";
 }
+
+TEST_F(CgroupTest, ProcessorsWithoutAQuota) {
+  EXPECT_EQ(CgroupProcessors(root_), std::nullopt);
+  Process("0::/\n", kMountOf2);
+  Write("/sys/fs/cgroup/cpu.max", "max 100000\n");
+  EXPECT_EQ(CgroupProcessors(root_), std::nullopt);
+  Process("4:memory:/\n1:cpu,cpuacct:/\n", kMountOf1);
+  Write("/sys/fs/cgroup/cpu/cpu.cfs_quota_us", "-1\n");
+  Write("/sys/fs/cgroup/cpu/cpu.cfs_period_us", "100000\n");
+  EXPECT_EQ(CgroupProcessors(root_), std::nullopt);
+}
+
+TEST_F(CgroupTest, ProcessorsAreTheLeastOfNestedGroups) {
+  Process("0::/kubepods.slice/pod.slice/server\n", kMountOf2);
+  const std::string pods = "/sys/fs/cgroup/kubepods.slice";
+  Write(pods + "/pod.slice/server/cpu.max", "max 100000\n");
+  Write(pods + "/pod.slice/cpu.max", "150000 100000\n");
+  EXPECT_EQ(CgroupProcessors(root_), 1.5);
+  Write(pods + "/cpu.max", "50000 200000\n");
+  EXPECT_EQ(CgroupProcessors(root_), 0.25);
+}
+
+TEST_F(CgroupTest, ProcessorsOfVersion1) {
+  Process("4:memory:/\n1:cpu,cpuacct:/docker/0123\n", kMountOf1);
+  Write("/sys/fs/cgroup/cpu/docker/0123/cpu.cfs_quota_us", "200000\n");
+  Write("/sys/fs/cgroup/cpu/docker/0123/cpu.cfs_period_us", "100000\n");
+  EXPECT_EQ(CgroupProcessors(root_), 2.0);
+}
+
+TEST(Machine, HasAProcessor) { EXPECT_GE(MachineProcessors(), 1u); }
 
 }  // namespace
 }  // namespace stellate::server

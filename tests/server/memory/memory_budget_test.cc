@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "core/base/message.h"
-#include "server/memory/machine_memory.h"
+#include "server/memory/machine.h"
 #include "tests/server/support/sphere.h"
 
 namespace stellate::server {
