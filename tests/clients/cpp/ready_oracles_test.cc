@@ -11,6 +11,7 @@
 #include <functional>
 #include <initializer_list>
 #include <limits>
+#include <numbers>
 #include <random>
 #include <thread>
 
@@ -239,6 +240,21 @@ TEST_P(Refused, WithWords) {
   }
 }
 
+TEST(Parametrized, MayComeRoundTurnedOver) {
+  const auto klein = [](const Vector& u) -> Vector {
+    const double ring = 2 + std::cos(u[1]), across = std::sin(u[1]);
+    return Eigen::Vector4d(ring * std::cos(u[0]), ring * std::sin(u[0]),
+                           across * std::cos(u[0] / 2), across * std::sin(u[0] / 2));
+  };
+  const double turn = 2 * std::numbers::pi;
+  const auto turns = [&](double share) {
+    return Chart{klein, {}, Vector::Zero(2), Eigen::Vector2d(share * turn, turn), {true}};
+  };
+  EXPECT_NO_THROW(Parametrized(turns(1)));  // after one it is at the other side, and M the same
+  EXPECT_NO_THROW(Parametrized(turns(2)));
+  EXPECT_THROW(Parametrized(turns(0.9)), std::invalid_argument);
+}
+
 Chart Interval(double lower, double upper, Eigen::Index d) {
   return {[d](const Vector& u) { return Vector::Constant(d, u[0]); },
           {},
@@ -283,6 +299,13 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"charts lead to",
               [] {
                 Parametrized(std::vector<Chart>{Interval(0, 1, 2), Interval(0, 1, 3)});
+              }},
+        Wrong{"come round as periodic says: from the lower end 0 of parameter 0 to the upper 360",
+              [] {
+                const auto circle = [](const Vector& u) -> Vector {
+                  return Eigen::Vector2d(std::cos(u[0]), std::sin(u[0]));
+                };
+                Parametrized(Chart{circle, {}, Vector::Zero(1), Vector::Constant(1, 360), {true}});
               }},
         Wrong{"two factors", [] { Product({Torus()}); }},
         Wrong{"null",
@@ -354,6 +377,10 @@ INSTANTIATE_TEST_SUITE_P(
         Wrong{"leave nothing to move",
               [] {
                 Linkage({{"a", "p", 1}, {"p", "b", 1}}, kGround);
+              }},
+        Wrong{"no bar has the fixed joint b at an end",
+              [] {
+                Linkage({{"a", "p", 1}}, kGround);
               }},
         Wrong{"no chain",
               [] {

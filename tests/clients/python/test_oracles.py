@@ -174,6 +174,18 @@ WRONG = {
     "either a map": lambda: oracles.Parametrized(),
     "lower < upper": lambda: oracles.Chart(torus_map, None, [1, 1], [0, 2]),
     "the first has to": lambda: oracles.Parametrized(lambda u: u, None, [0, 0], [1, 1]),
+    "map does not come round as periodic .* 0 to the upper 360 .*2 . np.pi": lambda: (
+        oracles.Parametrized(torus_map, None, [0, 0], [360, 360], True)
+    ),
+    "map does not come round as periodic .* 0 to the upper 180": lambda: oracles.Parametrized(
+        circle, None, [0], [180], True
+    ),
+    "chart 1 does not come round .* of parameter 1": lambda: oracles.Parametrized(
+        charts=[
+            oracles.Chart(torus_map, None, [0, 0], [TURN, upper], [False, True])
+            for upper in (TURN, TURN / 2)
+        ]
+    ),
     "two factors": lambda: oracles.Product(TORUS),
     "orthonormal": lambda: oracles.Transformed(TORUS, rotation=2 * np.eye(3)),
     "shape": lambda: oracles.Transformed(TORUS, rotation=np.eye(2)),
@@ -208,6 +220,9 @@ WRONG = {
     "not an immersion near": lambda: oracles.Quotient(TORUS, lambda x: x[:, [0, 0, 0]]),
     "does not embed in": lambda: oracles.Quotient(TORUS, lambda x: x[:, :2]),
     "leave nothing to move": lambda: oracles.Linkage([("a", "p", 1), ("p", "b", 1)], GROUND),
+    "no bar has the fixed joint 'c'.*'a', 'p', 'q', 'b'": lambda: oracles.Linkage(
+        FOUR_BARS, {**GROUND, "c": (1, 1)}
+    ),
     "no chain": lambda: oracles.Linkage([("p", "q", 1)], GROUND),
     "two joints that are fixed": lambda: oracles.Linkage([("a", "b", 1)], GROUND),
     "too short": lambda: oracles.Linkage(
@@ -230,6 +245,21 @@ class _Bare:
 def test_what_is_wrong_is_said(words):
     with pytest.raises(stellate.InvalidArgument, match=words):
         WRONG[words]()
+
+
+def test_a_parameter_may_come_round_turned_over():
+    def klein(u):
+        ring, half = 2 + np.cos(u[:, 1]), u[:, 0] / 2
+        across = np.sin(u[:, 1])
+        return np.stack(
+            [ring * np.cos(2 * half), ring * np.sin(2 * half), across * np.cos(half), across * np.sin(half)],
+            axis=1,
+        )  # fmt: skip
+
+    for turns in (1, 2):  # after one it is at the other side, and M the same
+        oracles.Parametrized(klein, None, [0, 0], [turns * TURN, TURN], True)
+    with pytest.raises(stellate.InvalidArgument, match="does not come round"):
+        oracles.Parametrized(klein, None, [0, 0], [0.9 * TURN, TURN], True)
 
 
 def circle(u):

@@ -5,6 +5,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <set>
 
 #include "oracles/combined/common.h"
@@ -16,6 +17,8 @@ constexpr int kSamples = 20'000;    // of all charts together, to begin from
 constexpr int kNearest = 8;         // of them looked at for each query
 constexpr size_t kBasins = 3;       // the most of these that begin a search
 constexpr double kSameBasin = 3.5;  // cells of the grid
+constexpr size_t kEnds = 16;        // samples at a period's ends that are compared
+constexpr double kSeam = 1e-4;      // of M's size: a gap there that no solver's error explains
 constexpr int kMaxIterations = 100, kMaxHalvings = 30, kMaxFlatHalvings = 20;
 
 // Lengths in shares of M's size.
@@ -27,6 +30,21 @@ constexpr double kUndecidedBy = 1e-12;               // then
 constexpr double kMet = 1e-13, kMetAtLeast = 1e-11;  // a flat; where no step comes nearer
 constexpr double kLeastBend = 0.05;  // of the distance, whose own is 1 where M is flat
 constexpr double kRegular = 1e-9;    // least pivot of a derivative, in shares of the largest
+
+// Whether a point is as near to some columns, samples of a face, as these to each other: a
+// parameter comes round turned over, as a Klein bottle's does.
+bool LiesAlong(const Eigen::MatrixXd& points, const std::vector<Eigen::Index>& face,
+               const Eigen::VectorXd& point) {
+  if (face.size() < 3) return false;
+  const Eigen::MatrixXd at = points(Eigen::all, face);
+  double apart = 0;  // squared
+  for (Eigen::Index i = 0; i < at.cols(); ++i) {
+    Eigen::VectorXd others = (at.colwise() - at.col(i)).colwise().squaredNorm();
+    others[i] = std::numeric_limits<double>::infinity();
+    apart = std::max(apart, others.minCoeff());
+  }
+  return (at.colwise() - point).colwise().squaredNorm().minCoeff() <= 4 * apart;
+}
 
 }  // namespace
 
@@ -44,8 +62,37 @@ Parametrized::Atlas::Atlas(std::vector<Chart> charts) {
     Refuse("charts of R^" + std::to_string(dimension()) + " into R^" +
            std::to_string(ambient_dimension()) + ": the first has to be the smaller");
   }
-  for (const CheckedChart& chart : charts_) chart.InsistOnExactness();
   scale_ = (points().rowwise().maxCoeff() - points().rowwise().minCoeff()).norm();
+  InsistOnComingRound();  // first: what turns many times looks inexact
+  for (const CheckedChart& chart : charts_) chart.InsistOnExactness();
+}
+
+// Refuses a periodic parameter at whose ends the map is at two places, as of degrees for radians.
+void Parametrized::Atlas::InsistOnComingRound() const {
+  for (size_t number = 0; number < charts_.size(); ++number) {
+    const CheckedChart& chart = charts_[number];
+    for (Eigen::Index a = 0; a < chart.k(); ++a) {
+      if (!chart.wraps(a)) continue;
+      std::vector<Eigen::Index> starts;
+      for (Eigen::Index j = 0; j < grid_.cols(); ++j) {
+        const bool mine = owner_[static_cast<size_t>(j)] == number;
+        if (mine && grid_(a, j) == chart.lower()[a]) starts.push_back(j);
+      }
+      const size_t step = std::max<size_t>(1, starts.size() / kEnds);
+      for (size_t i = 0; i < starts.size(); i += step) {
+        Eigen::VectorXd end = grid_.col(starts[i]);
+        end[a] = chart.upper()[a];
+        const double gap = (chart.Point(end) - points().col(starts[i])).norm();
+        if (gap <= kSeam * scale_ || LiesAlong(points(), starts, chart.Point(end))) continue;
+        Refuse((charts_.size() == 1 ? "the map" : "chart " + std::to_string(number)) +
+               " does not come round as periodic says: from the lower end " +
+               Short(chart.lower()[a]) + " of parameter " + std::to_string(a) + " to the upper " +
+               Short(chart.upper()[a]) + " it goes " + Short(gap) +
+               " away. Give a whole period, in the unit that the map takes (std::cos takes "
+               "radians), or leave periodic out");
+      }
+    }
+  }
 }
 
 // A grid of parameters on each chart, and where it lies in R^d.

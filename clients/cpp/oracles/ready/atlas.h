@@ -16,6 +16,7 @@ class CheckedChart {
 
   Eigen::Index k() const { return chart_.lower.size(); }
   const Eigen::VectorXd& lower() const { return chart_.lower; }
+  const Eigen::VectorXd& upper() const { return chart_.upper; }
   const Eigen::VectorXd& extent() const { return extent_; }
   bool wraps(Eigen::Index a) const { return chart_.periodic[static_cast<size_t>(a)]; }
 
@@ -61,6 +62,7 @@ class Parametrized::Atlas {
     Eigen::VectorXd u;
   };
   void Sample();
+  void InsistOnComingRound() const;
   std::vector<Beginning> Beginnings(const Eigen::VectorXd& x) const;
   bool Apart(Eigen::Index a, Eigen::Index b) const;
   bool Descend(const Beginning& from, const Eigen::VectorXd& x, Eigen::VectorXd& y,

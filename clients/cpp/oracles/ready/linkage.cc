@@ -56,6 +56,18 @@ std::vector<std::string> MovingOf(const std::vector<Bar>& bars, const Places& fi
   return moving;
 }
 
+void InsistOnBarsAt(const std::vector<Bar>& bars, const Places& fixed) {
+  for (const auto& [joint, place] : fixed) {
+    const bool held = std::any_of(bars.begin(), bars.end(), [&name = joint](const Bar& bar) {
+      return bar.a == name || bar.b == name;
+    });
+    if (!held) {
+      Refuse("no bar has the fixed joint " + joint +
+             " at an end. Is it a slip of the pen? Else leave it out");
+    }
+  }
+}
+
 // As far as bars reach from the fixed joints, by shortest chains.
 BoundingBox BoxOf(const std::vector<Bar>& bars, const Places& fixed,
                   const std::vector<std::string>& moving, Eigen::Index space) {
@@ -102,6 +114,7 @@ struct Linkage::Plan {
              " bars leave nothing to move");
     }
     box = BoxOf(bars, fixed, moving, space);
+    InsistOnBarsAt(bars, fixed);
     for (const Bar& bar : bars) rods.push_back({EndOf(bar.a), EndOf(bar.b), bar.length});
   }
 

@@ -63,6 +63,13 @@ class Linkage(ImplicitManifold):
         )
         self._bars = [(a, b, float(length)) for a, b, length in bars]
         lower, upper = self._box()
+        loose = [name for name in places if not any(name in bar[:2] for bar in bars)]
+        if loose:
+            raise InvalidArgument(
+                f"no bar has the fixed joint {loose[0]!r} at an end: the bars' joints are "
+                f"{', '.join(map(repr, dict.fromkeys(j for bar in bars for j in bar[:2])))}. "
+                "Is it a slip of the pen? Else leave it out"
+            )
         super().__init__(
             self._excess,
             self._excess_derivative,

@@ -17,6 +17,7 @@ _SAMPLES = 20_000  # of all charts together, to begin from
 _NEAREST = 8  # of them looked at for each query
 _BASINS = 3  # the most of these that begin a search
 _ITERATIONS = 100
+_SEAM = 1e-4  # of M's size: a gap between a period's ends that no solver's error explains
 _ENDS = 16  # samples of each end of a parameter's interval that are looked beyond
 
 
@@ -143,13 +144,36 @@ class Parametrized(Projection):
             u = np.stack(np.meshgrid(*sides, indexing="ij"), axis=-1).reshape(-1, self.dimension)
             grids.append(u)
             points.append(as_points(chart.points(u), f"the points of chart {number}"))
-            chart.insist_on_exactness()
+            size = float(norms(np.ptp(points[-1], axis=0)))
+            self._insist_on_coming_round(number, chart, u, size)
+            chart.insist_on_exactness()  # after that: what turns many times looks inexact
             owners.append(np.full(len(u), number))
         if len({p.shape[1] for p in points}) > 1:
             raise InvalidArgument(f"charts lead to R^d of d = {[p.shape[1] for p in points]}")
         self._grid, self._points = np.concatenate(grids), np.concatenate(points)
         self._owner, self._cells = np.concatenate(owners), per_side
         self._tree = tree_of(self._points)
+
+    def _insist_on_coming_round(self, number: int, chart: Chart, u: Array, size: float) -> None:
+        """Raises: InvalidArgument, of a periodic parameter at whose ends the map is at two places."""
+        for axis in np.flatnonzero(chart.wraps):
+            face = u[u[:, axis] == chart.lower[axis]]
+            starts = face[:: max(1, len(face) // _ENDS)]
+            ends = starts.copy()
+            ends[:, axis] = chart.upper[axis]
+            at, after = chart.points(starts), chart.points(ends)
+            gaps = norms(after - at)
+            worst = int(np.argmax(gaps))
+            if gaps[worst] <= _SEAM * size or _lies_along(chart.points(face), after):
+                continue
+            which = "the map" if len(self._charts) == 1 else f"chart {number}"
+            raise InvalidArgument(
+                f"{which} does not come round as periodic says: from the lower end {chart.lower[axis]:g} of "
+                f"parameter {axis} to the upper {chart.upper[axis]:g} it goes from "
+                f"{at[worst].round(6).tolist()} to {after[worst].round(6).tolist()}. Give a whole period, in "
+                "the unit that the map takes (numpy's cos takes radians: 2 * np.pi, not 360), or leave "
+                "periodic out"
+            )
 
     def _beginnings(self, x: Array) -> list[tuple[Any, Chart, Array]]:
         """(rows of x, their chart, parameters) to begin from: the nearest sample, and others near
@@ -273,6 +297,16 @@ def _halve_until_nearer(
         left = left[~better]
         fraction /= 2
     return moved
+
+
+def _lies_along(face: Array, points: Array) -> bool:
+    """Whether points are as near to samples of a face as these to each other: it comes round turned over, as
+    a Klein bottle's parameter does."""
+    if len(face) < 3:
+        return False
+    tree = tree_of(face)
+    apart = np.asarray(tree.query(face, k=2)[0])[:, 1].max()
+    return bool((np.asarray(tree.query(points, k=1)[0]).reshape(-1) <= 2 * apart).all())
 
 
 def _meet(chart: Chart, u: Array, c: Array, bases: Array, scale: float) -> tuple[Array, Flags]:
