@@ -215,3 +215,27 @@ def test_an_axis_of_one_value_is_told(shape):
         stellate.InvalidArgument, match=r"an axis of one value is none: squeeze\(\)"
     ):
         oracles.SignedDistance.of_volume(np.zeros(shape))
+
+
+def segmented():
+    """A ball of label 7 in one of label 3."""
+    return np.select([ball() < -4, ball() < 0], [7, 3], 0).astype(np.int16)
+
+
+@pytest.mark.parametrize("settings", [{}, {"smooth": 1.5}, {"level": 2, "smooth": 1.5}])
+def test_labels_of_a_segmentation_are_no_values(settings):
+    with pytest.raises(
+        stellate.InvalidArgument, match=r"3 numbers 0, 3, 7 alone.*labels == 3.*solids\.Phases"
+    ):
+        OfVolume(segmented(), **settings)
+    OfVolume(segmented() == 3, smooth=1.0)
+
+
+def test_a_label_that_is_not_there_is_said_to_be_none():
+    with pytest.raises(stellate.InvalidArgument, match=r"False everywhere.*np\.unique"):
+        OfVolume(segmented() == 5, smooth=1.5)
+
+
+def test_one_length_smooths_all_axes():
+    with pytest.raises(stellate.InvalidArgument, match=r"smooth is one length.*\(1, 1, 2\)"):
+        OfVolume(segmented() == 3, spacing=(1, 1, 2), smooth=(1, 1, 2))

@@ -15,6 +15,8 @@ from ._implicit import ImplicitManifold
 
 Border = Literal["closed", "open"]
 
+_MOST_LABELS = 16  # whole numbers that are taken for labels
+_MOST_LABELS = 16  # whole numbers that are taken for labels
 _MANY_VOXELS = 2  # a standard deviation that is most likely a length in another unit
 
 
@@ -132,9 +134,20 @@ class SignedDistance(ImplicitManifold):
         """
         volume = np.asarray(unmasked(array))
         mask = volume.dtype.kind == "b"
+        if not mask and (level is None or smooth > 0):
+            _insist_on_one_label(volume)
+        if mask and volume.size and volume.all() == volume.any():
+            raise InvalidArgument(
+                f"the mask is {bool(volume.all())} everywhere: is the label among np.unique(labels)?"
+            )
         if level is None:
             level = 0.5 if mask else 0.0
         d = volume.ndim
+        if np.ndim(smooth) != 0:
+            raise InvalidArgument(
+                "smooth is one length, in spacing's unit, which spacing turns into voxels of each axis: some 1.5 "
+                f"of the largest spacing; it is {smooth!r}"
+            )
         try:
             sides = np.broadcast_to(np.asarray(spacing, dtype=np.float64), (d,))
             lower = np.broadcast_to(np.asarray(origin, dtype=np.float64), (d,))
@@ -157,6 +170,21 @@ class SignedDistance(ImplicitManifold):
         if smooth > 0:
             oracle.about += f", smoothed by {smooth:.6g}"
         return oracle
+
+
+def _insist_on_one_label(volume: Array) -> None:
+    """Raises: InvalidArgument, of the labels of a segmentation, which no level tells apart."""
+    if volume.dtype.kind not in "iuf" or not volume.size:
+        return
+    found = np.unique(volume)
+    if not 2 < len(found) <= _MOST_LABELS or (found != np.round(found)).any():
+        return
+    names = ", ".join(f"{label:g}" for label in found)
+    raise InvalidArgument(
+        f"the volume holds the {len(found)} numbers {names} alone, as labels of a segmentation do, and between two "
+        "labels that are no neighbours smoothing makes up the others. Take one, of_volume(labels == "
+        f"{found[1]:g}, spacing=..., smooth=...), or all in one mesh, by solids.Phases"
+    )
 
 
 def _leaves_nothing(smooth: float, sides: Array, smoothed: Array, level: float) -> str:
