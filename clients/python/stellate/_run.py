@@ -16,6 +16,7 @@ from ._checkpoint import Checkpoint
 from ._command_oracle import CommandOracle
 from ._download import assemble
 from ._epsilon import Epsilon, choose
+from ._extent import insist_on_an_end, warn_of_count
 from ._files.formats import save
 from ._findings import CheckReport
 from ._follow import Arrival, Following, OnProgress
@@ -196,6 +197,8 @@ class Run:
             oracle = part_of(oracle, keep, options.get("seeds"))
         checked = CheckedOracle(oracle)
         mesh_spec(checked, 1.0, options)  # what is misspelt shows before the oracle is probed
+        if not isinstance(oracle, CommandOracle):
+            insist_on_an_end(checked)
         choice: Choice = choose
         if checkpoint is not None:
             choice = checkpoint.choose_epsilon
@@ -236,6 +239,7 @@ class Run:
             client = server
 
             def begin(size: float) -> _Live:
+                self._warn_of_count(client, checked, size, options)
                 info = self._declare(client, checked, size, options)
                 live = _Live(client, info, self._follow(client, info, every))
                 live.workers = _Workers(
@@ -278,6 +282,15 @@ class Run:
         """What our own oracle raised."""
         workers = self._at_work.workers
         return None if workers is None else workers.failure
+
+    def _warn_of_count(
+        self, client: Client, oracle: CheckedOracle, epsilon: float, options: Mapping[str, Any]
+    ) -> None:
+        if self._is_command:
+            return
+        given = options.get("max_vertices")
+        is_graded = "size_rate" in options or "max_deviation" in options
+        warn_of_count(oracle, epsilon, is_graded, lambda: int(given or client.info().max_vertices))
 
     def _declare(
         self, client: Client, oracle: CheckedOracle, epsilon: float, options: Mapping[str, Any]

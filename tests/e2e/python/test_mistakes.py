@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 import stellate
-from stellate import manifolds
+from stellate import manifolds, solids
 
 
 def mesh(oracle=None, epsilon=0.3, **keywords):
@@ -74,3 +74,15 @@ def test_a_file_that_is_no_mesh(tmp_path):
         stellate.load_txt(tmp_path / "binary.txt")
     with pytest.raises(ValueError, match="words.txt: .*'half'"):
         stellate.load_txt(tmp_path / "words.txt")
+
+
+def test_an_epsilon_for_too_many_vertices_is_said_before_it_takes_them(server):
+    with pytest.warns(UserWarning, match="asks for about .* vertices.* at the 50 that") as caught:
+        mesh(epsilon=0.01, max_vertices=50, server=server)
+    assert caught[0].filename == __file__
+
+
+def test_a_solid_without_an_end_is_no_mesh(server):
+    outside = solids.Implicit(lambda x: (x * x).sum(axis=1) - 1, bounding_box=([-2] * 3, [2] * 3))
+    with pytest.raises(stellate.OracleError, match="goes on outside of its bounding box"):
+        mesh(outside, server=server, max_vertices=500)

@@ -29,14 +29,19 @@ class Touching:
     Args:
       values, slopes: of walls of a domain of space, by their numbers: (n, len(face)), (n, len(face), d).
       inside: sign vectors (n, walls), True where a wall is positive -> labels (n,).
-      size: of the box.
+      box: (lower (d,), upper (d,)) around the domain, which alone is looked at.
     """
 
     def __init__(
-        self, values: Values, slopes: Values, inside: Callable[[Flags], Any], size: float
+        self,
+        values: Values,
+        slopes: Values,
+        inside: Callable[[Flags], Any],
+        box: tuple[Array, Array],
     ) -> None:
-        self._values, self._slopes = values, slopes
-        self._inside, self._size, self._batches = inside, size, _BATCHES
+        self._values, self._slopes, self._box = values, slopes, box
+        self._size = float(norms(box[1] - box[0]))
+        self._inside, self._batches = inside, _BATCHES
         self._cross: set[tuple[int, ...]] = set()  # pairs of walls that were seen to
         self._nearest: dict[tuple[int, ...], float] = {}  # pairs, and how near they were looked at
         self._usual: Array = np.zeros(1)  # the largest values so far
@@ -60,6 +65,8 @@ class Touching:
 
         Raises: OracleError, as insist_they_cross.
         """
+        within = ((self._box[0] <= x) & (x <= self._box[1])).all(axis=1)
+        x, values = x[within], values[within]
         with np.errstate(invalid="ignore", divide="ignore"):
             sizes = np.abs(values)
             self._usual = np.fmax(self._usual, sizes.max(axis=0, initial=0.0))

@@ -161,9 +161,7 @@ class Clipped:
         self.about = self._base.about
         self._faces: dict[tuple[int, ...], Callable[[Array], tuple[Array, Flags]]] = {}
         lower, upper = where_of(self._base)
-        self._touching = Touching(
-            self._values, self._slopes, self._label_at, float(norms(upper - lower))
-        )
+        self._touching = Touching(self._values, self._slopes, self._label_at, (lower, upper))
         about = self._base.seeds
         self._exactness = [Exactness(about, lower, upper) for _ in self._walls]
 
