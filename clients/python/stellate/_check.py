@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import numbers
 from typing import TYPE_CHECKING, Any
 
@@ -11,6 +12,7 @@ from ._findings import CheckReport, Finding
 from ._generated import stellate_pb2 as pb
 from ._generated import stellate_pb2_grpc as rpc
 from ._generated.mesh_pb2 import MeshSpec
+from ._places import Places
 from ._rank import find_singular
 from ._trace import trace_headers
 from ._wire.calls import end
@@ -37,6 +39,21 @@ def examine(
     except (InvalidArgument, OracleError) as error:
         return CheckReport(()).adding(Finding("error", "WRONG_SHAPE", str(error), ""))
     report = _ask_server(client, stub, checked, spec)
+    return _in_own_coordinates(_with_rank(report, checked, seed), oracle)
+
+
+def _in_own_coordinates(report: CheckReport, oracle: Any) -> CheckReport:
+    """Of an oracle in units, or on a periodic cell, the places by which people know them."""
+    places = Places(oracle, asked=True)
+    if not places.known:
+        return report
+    d = CheckedOracle(oracle).ambient_dimension
+    findings = tuple(places.in_finding(finding, d) for finding in report.findings)
+    return dataclasses.replace(report, findings=findings)
+
+
+def _with_rank(report: CheckReport, checked: CheckedOracle, seed: int) -> CheckReport:
+    """And where equations lose rank, if they do."""
     if not checked.has_jacobian or not report.samples or _NO_MANIFOLD & set(report.codes):
         return report
     try:

@@ -8,6 +8,7 @@ from typing import Any, Callable
 
 import numpy as np
 
+from ._findings import Finding
 from ._mesh import Mesh
 from .errors import StellateError
 from .report import Report
@@ -57,6 +58,16 @@ class Places:
             points = error.mesh.points if isinstance(error.mesh, Mesh) else np.empty((0, d))
             error.args = (self.in_words(str(error), points),)
         return error
+
+    def in_finding(self, finding: Finding, d: int) -> Finding:
+        """What a doctor found of an oracle in R^d, with its places in those coordinates."""
+        if self._coordinates is None:
+            return finding
+        message = self.in_words(finding.message, np.empty((0, d)))
+        place = finding.place
+        if place is not None and len(place) == d:
+            place = self._plain(np.asarray(place, dtype=np.float64)[None])[0]
+        return dataclasses.replace(finding, message=message, place=place)
 
     def in_words(self, text: str, points: np.ndarray) -> str:
         """A text in which each point of R^d is that of the vertex there, or else as it was rounded.

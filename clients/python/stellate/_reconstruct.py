@@ -8,6 +8,7 @@ import os
 import sys
 import threading
 from collections.abc import Sequence
+from types import SimpleNamespace
 from typing import Any, Callable, Union
 
 import numpy as np
@@ -19,6 +20,7 @@ from ._info import MeshInfo, unless_failed
 from ._interrupt import Interrupts
 from ._mesh import FinishedMesh
 from ._notebook import calm_output
+from ._places import Places
 from ._point_sets import column_names
 from ._points import CheckedPoints, Noise, Weights
 from ._upload import Upload
@@ -88,8 +90,8 @@ def reconstruct(
       steiner: vertices may be added where neither tilings nor weights make stars agree, nor leaving
         points out: at most one for each hundred points, or 16. They come after the points.
       scale: (d,) positive lengths, about how far the manifold goes along each axis, where axes have
-        different units, or one for all: the complex is built in the coordinates x / scale. `noise`, `reach`,
-        all lengths and places in the report are in these; points, tangents and the mesh are in x.
+        different units, or one for all: the complex is built in the coordinates x / scale. `noise`, `reach`
+        and all lengths in the report are in these; points, tangents, places and the mesh are in x.
       credentials: a stellate.Credentials for `server`, where it wants TLS or a token.
       require_certified: a mesh that is not certified is an error, NotCertified.
       save: a file or several to write the mesh to, as for stellate.mesh.
@@ -155,6 +157,7 @@ def reconstruct(
 
 def _in_own_coordinates(mesh: FinishedMesh, given: np.ndarray, units: np.ndarray) -> FinishedMesh:
     """A mesh of the points given / units."""
+    mesh = Places(SimpleNamespace(coordinates=lambda y: y * units)).in_mesh(mesh)
     points = mesh.points * units
     points[: len(given)] = given[: len(points)]  # to the last bit
     smoothed = None if mesh.smoothed is None else mesh.smoothed * units

@@ -198,6 +198,45 @@ def test_places_of_a_refusal_are_in_own_coordinates(server):
     assert place in " ".join(str(mesh.report).split())
 
 
+def test_the_doctor_names_places_in_own_coordinates(server):
+    def wrong(x):  # the second derivative is three times too large
+        return (2 * x / SCALE**2 * [1, 3, 1])[:, None, :]
+
+    box = {"bounding_box": (-1.3 * SCALE, 1.3 * SCALE), "ambient_dimension": 3, "dimension": 2}
+    scaled = oracles.in_units(stellate.ImplicitManifold(on_ellipsoid, wrong, **box), SCALE)
+    (error,) = [
+        it for it in stellate.check(scaled, server=server).findings if it.code == "WRONG_DERIVATIVE"
+    ]
+    near = error.message[error.message.index("[") + 1 : error.message.index("]")].split(",")
+    assert abs(on_ellipsoid(np.array([near], dtype=float))[0]) < 0.05
+
+    class Halfway:
+        """closest_point goes half of the way to the sphere x / SCALE in S^2, and is found out."""
+
+        dimension, ambient_dimension, coordinate_scale = 2, 3, SCALE
+        bounding_box = [-1.3] * 3, [1.3] * 3
+
+        def closest_point(self, y):
+            return y / np.sqrt(np.linalg.norm(y, axis=1, keepdims=True))
+
+    (error,) = [
+        it for it in stellate.check(Halfway(), server=server).findings if it.severity == "error"
+    ]
+    first = error.message[error.message.index("[") + 1 : error.message.index("]")].split(",")
+    assert np.allclose(error.place, np.array(first, dtype=float), rtol=1e-4)
+    assert 0.3 < np.linalg.norm(error.place / SCALE) < 2
+
+
+def test_places_of_a_reconstruction_are_in_own_coordinates(server, rng):
+    half = rng.normal(size=(600, 3))
+    half = half[half[:, 2] > 0] / np.linalg.norm(half[half[:, 2] > 0], axis=1, keepdims=True)
+    points = half * SCALE
+    mesh = stellate.reconstruct(points, 2, scale=SCALE, server=server)
+    words = re.search(r"first is point (\d+), \((.*?)\): EDGE", mesh.report.certificate.verdict)
+    there = np.array(words[2].split(","), dtype=float)
+    assert np.allclose(there, points[int(words[1])], rtol=2e-3)
+
+
 def test_places_of_an_error_are_in_own_coordinates(server):
     squared = stellate.ImplicitManifold(
         lambda x: on_ellipsoid(x) ** 2,
