@@ -35,6 +35,19 @@ tl::unexpected<Error> Failed(const std::string& what) {
   return Fail(ErrorCode::kServerFailed, what);
 }
 
+constexpr size_t kLongestSocketPath = 100;  // the kernel takes 107 bytes
+
+// For this user alone, in /tmp where $TMPDIR is none or too long for a socket; "" and errno if not.
+std::string MakeDirectory() {
+  const std::string name = "stellate-XXXXXX";
+  std::error_code error;
+  std::string pattern = (fs::temp_directory_path(error) / name).string();
+  const bool fits = pattern.size() + std::strlen("/socket") <= kLongestSocketPath;
+  if (!error && fits && mkdtemp(pattern.data()) != nullptr) return pattern;
+  pattern = "/tmp/" + name;
+  return mkdtemp(pattern.data()) == nullptr ? "" : pattern;
+}
+
 }  // namespace
 
 Expected<std::string> FindServer() {
@@ -71,14 +84,11 @@ Expected<std::unique_ptr<EmbeddedServer>> EmbeddedServer::Start() {
 }
 
 Expected<void> EmbeddedServer::Launch(const std::string& binary) {
-  std::error_code error;
-  std::string pattern = (fs::temp_directory_path(error) / "stellate-XXXXXX").string();
-  // mkdtemp makes it for this user alone; a socket's path must fit into 107 bytes.
-  if (error || mkdtemp(pattern.data()) == nullptr) {
-    return Failed(std::string("cannot make a directory for the server's socket: ") +
+  directory_ = MakeDirectory();
+  if (directory_.empty()) {
+    return Failed(std::string("cannot make a directory for the server's socket in /tmp: ") +
                   std::strerror(errno));
   }
-  directory_ = pattern;
   address_ = "unix:" + directory_ + "/socket";
   const std::string log = directory_ + "/log";
   int pipe_ends[2];

@@ -74,7 +74,7 @@ def mesh(
     credentials: Credentials | None = None,
     require_certified: bool = False,
     checkpoint: str | os.PathLike[str] | None = None,
-    save: Path | Sequence[Path] = (),
+    save: Path | Sequence[Path] | None = (),
     keep: Keep | None = None,
     scale: Any = None,
     keep_on_server: bool = False,
@@ -110,7 +110,7 @@ def mesh(
     credentials: Credentials | None = None,
     require_certified: bool = False,
     checkpoint: str | os.PathLike[str] | None = None,
-    save: Path | Sequence[Path] = (),
+    save: Path | Sequence[Path] | None = (),
     keep: Keep | None = None,
     scale: Any = None,
     keep_on_server: bool = False,
@@ -398,7 +398,9 @@ def download(
     return mesh
 
 
-def _files(paths: Path | Sequence[Path]) -> list[Path]:
+def _files(paths: Path | Sequence[Path] | None) -> list[Path]:
+    if paths is None:
+        return []
     return [paths] if isinstance(paths, (str, os.PathLike)) else list(paths)
 
 

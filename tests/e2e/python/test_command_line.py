@@ -10,6 +10,7 @@ import pytest
 import stellate
 from stellate import manifolds
 from stellate._command_line import main
+from stellate.viewer import find_stellate
 
 SHAPES = """
 import os, time
@@ -230,3 +231,16 @@ def test_declaring_takes_nothing_that_only_serving_needs(shell):
     with pytest.raises(TypeError, match="'workers' is for who serves the mesh"):
         with stellate.Client() as client:
             client.create(stellate.manifolds.Sphere(1), 0.5, workers=2)
+
+
+@pytest.mark.parametrize("where", ["no such folder", "x" * 120])
+def test_a_socket_goes_elsewhere_than_where_it_cannot_be(where, tmp_path):
+    """$TMPDIR that is not there, or too long for the kernel's 107 bytes."""
+    folder = tmp_path / where
+    if " " not in where:
+        folder.mkdir()
+    ran = subprocess.run(
+        [find_stellate(), "mesh", "sphere", "-e", "0.5", "-q"],
+        env={**os.environ, "TMPDIR": str(folder)}, capture_output=True, text=True, timeout=120,
+    )  # fmt: skip
+    assert ran.returncode == 0, ran.stderr

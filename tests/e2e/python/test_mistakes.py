@@ -86,3 +86,9 @@ def test_a_solid_without_an_end_is_no_mesh(server):
     outside = solids.Implicit(lambda x: (x * x).sum(axis=1) - 1, bounding_box=([-2] * 3, [2] * 3))
     with pytest.raises(stellate.OracleError, match="goes on outside of its bounding box"):
         mesh(outside, server=server, max_vertices=500)
+
+
+def test_no_file_is_none_and_a_folder_is_no_file(server, tmp_path):
+    assert mesh(server=server, save=None).certified
+    with pytest.raises(IsADirectoryError, match="is a folder: give a file's name"):
+        mesh(server=server, save=tmp_path)

@@ -42,9 +42,9 @@ def check_save(path: str | os.PathLike[str], dimension: int, ambient_dimension: 
       package that is not installed; OSError when the folder is not there or cannot be written to.
     """
     path = os.fspath(path)
-    _choose(path, dimension, ambient_dimension)
     if os.path.isdir(path):
-        raise IsADirectoryError(f"{path} is a folder")
+        raise IsADirectoryError(f"{path} is a folder: give a file's name")
+    _choose(path, dimension, ambient_dimension)
     place = path if is_special(path) else os.path.dirname(os.path.realpath(path))
     if not os.path.exists(place):
         raise FileNotFoundError(f"cannot write {path}: there is no folder {place}")
