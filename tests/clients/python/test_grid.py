@@ -239,3 +239,8 @@ def test_a_label_that_is_not_there_is_said_to_be_none():
 def test_one_length_smooths_all_axes():
     with pytest.raises(stellate.InvalidArgument, match=r"smooth is one length.*\(1, 1, 2\)"):
         OfVolume(segmented() == 3, spacing=(1, 1, 2), smooth=(1, 1, 2))
+
+
+def test_voxels_of_a_crystal_that_is_not_square_are_said_to_have_no_spacing():
+    with pytest.raises(stellate.InvalidArgument, match=r"not square to each other.*\.cube"):
+        OfVolume(ball(), spacing=np.eye(3) + 0.1)

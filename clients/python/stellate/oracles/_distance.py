@@ -152,8 +152,14 @@ class SignedDistance(ImplicitManifold):
             sides = np.broadcast_to(np.asarray(spacing, dtype=np.float64), (d,))
             lower = np.broadcast_to(np.asarray(origin, dtype=np.float64), (d,))
         except ValueError:
+            skew = (
+                "; voxels whose axes are not square to each other, as a crystal's, have no spacing: see the .cube "
+                "file on the documentation's page on Fermi surfaces"
+                if np.shape(spacing) == (d, d)
+                else ""
+            )
             raise InvalidArgument(
-                f"spacing and origin have to be one number or {d}, and are {spacing!r} and {origin!r}"
+                f"spacing and origin have to be one number or {d}, and are {spacing!r} and {origin!r}{skew}"
             ) from None
         if not (
             np.isfinite(sides).all() and (sides > 0).all() and np.isfinite(smooth) and smooth >= 0
@@ -183,7 +189,7 @@ def _insist_on_one_label(volume: Array) -> None:
     raise InvalidArgument(
         f"the volume holds the {len(found)} numbers {names} alone, as labels of a segmentation do, and between two "
         "labels that are no neighbours smoothing makes up the others. Take one, of_volume(labels == "
-        f"{found[1]:g}, spacing=..., smooth=...), or all in one mesh, by solids.Phases"
+        f"{found[1]:g}, spacing=..., smooth=...), or all in one mesh: solids.Phases.of_labels(labels, spacing=..., smooth=...)"
     )
 
 

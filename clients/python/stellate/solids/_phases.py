@@ -14,6 +14,8 @@ from .._rows import Array
 from ..errors import InvalidArgument
 from ..oracles import Solid as WalledSolid
 from ..oracles._walls import derived
+from ._label_volume import splines_of_labels
+from ._primitives import Implicit
 from ._signs import MOST_IN_TABLES, Labels, needed
 from ._solid import ByWalls, Solid
 from ._walls import Function, Wall
@@ -63,6 +65,33 @@ class Phases(ByWalls):
         self.region_names = tuple(names)
         self._functions, self._slopes = functions, tuple(slopes)
         self._region: Solid | None = None
+
+    @classmethod
+    def of_labels(
+        cls,
+        labels: Any,
+        *,
+        spacing: Any = 1.0,
+        origin: Any = 0.0,
+        smooth: float,
+        names: Sequence[str] = (),
+    ) -> Phases:
+        """The materials of a segmentation: a volume of voxels with a whole number each, 0 outside.
+
+        Args:
+          labels: (n_1, ..., n_d), with two to six numbers beside 0. In their order they are labels 1, 2,
+            ... of the mesh. Around them there has to be a layer of 0: np.pad(labels, 3).
+          spacing, origin: of voxels, as in oracles.SignedDistance.of_volume.
+          smooth: a length, some 1.5 of the largest spacing: each label's mask is smoothed by it, and the
+            largest wins. What is thinner than twice that is lost, and what is round gets smaller.
+          names: of the materials; by default "label_3" of the number 3, and so on.
+
+        Raises: InvalidArgument, without scipy, too.
+        """
+        functions, numbers, body = splines_of_labels(labels, spacing, origin, smooth)
+        given = names or [f"label_{number}" for number in numbers]
+        value, gradient, box = body
+        return cls(*functions, names=given) & Implicit(value, gradient, bounding_box=box)
 
     def __and__(self, other: Solid) -> Phases:
         if not isinstance(other, Solid):
