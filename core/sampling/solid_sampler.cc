@@ -1,6 +1,8 @@
 #include "core/sampling/solid_sampler.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <utility>
 
 #include "core/base/parallel.h"
@@ -10,6 +12,10 @@ namespace {
 
 // Proposals nearer to each other than this many spacings are one place of the lattice.
 constexpr double kSamePlace = 0.5;
+// Points that join without a query between them; later as many as there are. What is unbounded
+// would otherwise be sampled in one round, up to the limit of vertices, before the run sees that it
+// leaves its box, and the server how much memory it takes.
+constexpr std::uint32_t kFewAtOnce = 1u << 14;
 
 // The lattice is not rotated anywhere.
 template <int K>
@@ -43,17 +49,24 @@ bool SolidSampler<K>::BeginFromNextSeed() {
   return !begun.empty();
 }
 
+// Returns whether it will be queried, and was not before.
 template <int K>
-void SolidSampler<K>::Doubt(const double* point) {
-  if (doubts_.AnyWithin(point, kSamePlace * growth_.spacing())) return;
+bool SolidSampler<K>::Doubt(const double* point) {
+  if (doubts_.AnyWithin(point, kSamePlace * growth_.spacing())) return false;
   doubted_.insert(doubted_.end(), point, point + K);
   doubts_.Insert(0);
+  return true;
 }
 
-// Grows as far as all points are certainly inside.
+// Grows as far as all points are certainly inside, or until there are so many that it queries one
+// of them and waits.
 template <int K>
 void SolidSampler<K>::Grow() {
+  const std::uint32_t before = engine_.stars().size();
+  const std::uint32_t most = before + std::max(before, kFewAtOnce);
   while (!engine_.is_full()) {
+    const std::uint32_t size = engine_.stars().size();
+    if (size >= most && Doubt(engine_.stars().sample().Point(size - 1))) return;
     typename Growth<K>::Ring ring = growth_.Propose();
     const Eigen::Index count = ring.points.cols();
     if (count == 0) return;

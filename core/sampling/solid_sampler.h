@@ -26,7 +26,7 @@ class SolidSampler final : public Sampler<K> {
  private:
   void Grow();
   bool BeginFromNextSeed();
-  void Doubt(const double* point);
+  bool Doubt(const double* point);
 
   Engine<K>& engine_;
   Growth<K> growth_;

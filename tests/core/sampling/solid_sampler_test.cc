@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <memory>
@@ -121,6 +122,28 @@ TEST(InteriorLaying, KeepsToItsVertices) {
     EXPECT_EQ(run.report().counts.vertices, 300u);
     EXPECT_EQ(SimplicesOf(run, m.k), SimplicesOf(*run.mesher, m.k));
   }
+}
+
+// All of the plane but a disc: it was laid up to the limit of vertices in one round, and a server
+// had no chance to see how much memory that takes.
+TEST(InteriorLaying, StopsSoonAfterItHasLeftTheBox) {
+  Domain m = stellate::testing::Make(2, 2, 1.3, {1, 1, 0}, {2, 2});
+  m.walls = {stellate::testing::BallOf(Vector2d::Zero(), 0.5, 1, 2)};
+  Specification spec = m.SpecificationFor(0.04);
+  spec.limits.max_vertices = 1'000'000;
+  const auto mesher = core::testing::NewMesher(spec);
+  std::uint64_t before = 0, largest_step = 0;
+  while (mesher->NextBatch()) {
+    core::testing::Step(*mesher, Answering(m));
+    const std::uint64_t now = mesher->progress().vertices;
+    largest_step = std::max(largest_step, now - before);
+    before = now;
+  }
+  EXPECT_EQ(mesher->report().termination, Termination::kNoProgress);
+  EXPECT_NE(mesher->report().certificate.verdict.find("leaves the bounding box"), std::string::npos)
+      << mesher->report().certificate.verdict;
+  EXPECT_LT(mesher->report().counts.vertices, 200'000u);
+  EXPECT_LT(largest_step, 70'000u);
 }
 
 TEST(InteriorLaying, MayBeCancelledAnywhere) {
