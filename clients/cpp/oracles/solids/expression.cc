@@ -96,6 +96,26 @@ constexpr std::array kMethods = {
     Method{"offset", [](const Solid& of, Arguments& a) { return of.Offset(a.Number("distance")); }},
 };
 
+struct Synonym {
+  std::string_view name, ours;
+};
+
+// What other programs call these.
+constexpr std::array kElsewhere = {
+    Synonym{"sphere", "ball(1)"},
+    Synonym{"cube", "box(-1, 1)"},
+    Synonym{"plane", "halfspace((0, 0, 1))"},
+    Synonym{"union", "a | b"},
+    Synonym{"difference", "a - b"},
+    Synonym{"subtract", "a - b"},
+    Synonym{"intersection", "a & b"},
+    Synonym{"intersect", "a & b"},
+    Synonym{"complement", "~a"},
+    Synonym{"translate", "a.at(1, 2, 3)"},
+    Synonym{"rotate", "a.rotated(z, 90)"},
+    Synonym{"scale", "a.scaled(2)"},
+};
+
 template <typename Table>
 std::string NamesOf(const Table& table) {
   std::string names;
@@ -165,7 +185,7 @@ class Parser {
                                            [&](const Primitive& p) { return p.name == name; });
     if (known == kPrimitives.end()) {
       at_ = static_cast<size_t>(column) - 1;
-      Expected("a solid: " + NamesOf(kPrimitives) + ", ~ or a parenthesis");
+      Expected("a solid: " + NamesOf(kPrimitives) + ", ~ or a parenthesis", HintFor(name));
     }
     if (++parts_ > kMostParts) {
       throw ExpressionError(column, "there are more than " + std::to_string(kMostParts) + " parts");
@@ -186,7 +206,7 @@ class Parser {
                                              [&](const Method& m) { return m.name == name; });
       if (known == kMethods.end()) {
         at_ = static_cast<size_t>(column) - 1;
-        Expected(NamesOf(kMethods));
+        Expected(NamesOf(kMethods), HintFor(name));
       }
       Arguments arguments = ArgumentsOf(name, column);
       solid = Guarded(column, [&] {
@@ -317,7 +337,13 @@ class Parser {
     if (!Next(wanted)) Expected(Quoted(std::string(1, wanted)));
   }
 
-  [[noreturn]] void Expected(const std::string& what) {
+  static std::string HintFor(std::string_view name) {
+    const auto* const known = std::find_if(kElsewhere.begin(), kElsewhere.end(),
+                                           [&](const Synonym& s) { return s.name == name; });
+    return known == kElsewhere.end() ? "" : "; write " + std::string(known->ours);
+  }
+
+  [[noreturn]] void Expected(const std::string& what, const std::string& hint = "") {
     Skip();
     std::string there = "the expression ends";
     if (!AtEnd()) {
@@ -326,7 +352,7 @@ class Parser {
       there = "there is " + Quoted(word.empty() ? text_.substr(start, 1) : word);
       at_ = start;
     }
-    throw ExpressionError(Column(), "expected " + what + ", and " + there);
+    throw ExpressionError(Column(), "expected " + what + ", and " + there + hint);
   }
 
   void Skip() {
