@@ -98,6 +98,7 @@ class UserFunction:
             raise OracleError(
                 f"{self.name} returned {got}; it has to be {_shape(count, *self.row)} for a batch of "
                 f"{count} points, a row each"
+                + _likely(values, count, self.row)
                 + ("" if self._worked else f"; {self._called(asked)}"),
                 "ORACLE_SHAPE",
             )
@@ -122,6 +123,21 @@ class UserFunction:
             return False
         wanted = (count, *self.row[1:])
         return all(isinstance(w, str) or w == got for w, got in zip(wanted, shape))
+
+
+def _likely(values: np.ndarray, count: int, row: tuple[int | str, ...]) -> str:
+    """What is most likely meant by values of another kind or number."""
+    if values.dtype.kind == "c":
+        return ". Of a complex equation give both parts: np.stack([w.real, w.imag], axis=1)"
+    wanted = row[0] if len(row) == 1 else "m"
+    if not isinstance(wanted, int) or values.ndim != 2:
+        return ""
+    if values.shape[0] == count and values.shape[1] > wanted > 1:
+        return (
+            ". Equations that follow from others, as half of P P = P does, are left out; or write an oracle with "
+            "a closest_point, for which matrices have factorisations"
+        )
+    return ""
 
 
 class Exactness:

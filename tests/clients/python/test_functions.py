@@ -117,6 +117,27 @@ def test_values_that_are_no_smooth_numbers_are_told_by_what_they_are(f, words):
         ask(implicit(f))
 
 
+def test_equations_of_matrices_and_of_complex_numbers_are_said_what_to_do_with():
+    def projections(x):  # of rank 1 in the plane: nine equations, of which three would do
+        p = x.reshape(-1, 2, 2)
+        rows = [(p @ p - p).reshape(-1, 4), (p - p.transpose(0, 2, 1)).reshape(-1, 4)]
+        return np.concatenate([*rows, np.trace(p, axis1=1, axis2=2)[:, None] - 1], axis=1)
+
+    def curve(x):  # w^2 = z^3 - z
+        z, w = x[:, 0] + 1j * x[:, 1], x[:, 2] + 1j * x[:, 3]
+        return w**2 - z**3 + z
+
+    for f, k, words in (
+        (projections, 1, "follow from others.*closest_point"),
+        (curve, 2, r"np.stack\(\[w.real, w.imag\], axis=1\)"),
+    ):
+        oracle = stellate.ImplicitManifold(
+            f, ambient_dimension=4, dimension=k, bounding_box=([-1] * 4, [1] * 4)
+        )
+        with pytest.raises(stellate.OracleError, match=words):
+            ask(oracle)
+
+
 @pytest.mark.parametrize("size", [1e-3, 1e-9])
 def test_a_function_that_draws_random_numbers_is_not_called_single_precision(size):
     random = np.random.default_rng(1)
