@@ -14,6 +14,7 @@ from .errors import InvalidArgument
 _PLAIN = "#6f9fc8"
 _SIZE_INCHES = 4.8
 _LIGHT = np.array([0.35, -0.45, 0.82]) / np.linalg.norm([0.35, -0.45, 0.82])
+_MOST_TICKS = 9  # of the longest axis, as matplotlib has it
 _FEW_TRIANGLES = 3000  # whose edges can be seen
 
 
@@ -187,6 +188,9 @@ def _dress(
         getattr(ax, f"set_{axis}lim")(middle[i] - half, middle[i] + half)
         if names is not None:
             getattr(ax, f"set_{axis}label")(names[i])
+        if points.shape[1] == 3 and frame:  # as many numbers as have place beside each other
+            most = max(1, round(_MOST_TICKS * extent[i] / max(extent)))
+            ax.locator_params(axis=axis, nbins=most)
     if points.shape[1] == 3:
         ax.set_box_aspect(extent, zoom=0.9 if frame else 1.1)
         ax.view_init(*view)

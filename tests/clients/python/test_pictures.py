@@ -124,3 +124,15 @@ def test_without_matplotlib_the_error_says_how_to_get_it(monkeypatch):
 def closed_figures():
     yield
     plt.close("all")
+
+
+def test_the_numbers_of_a_thin_axis_have_place():
+    """Of a terrain a hundredth as high as wide, whose picture had eight heights over each other."""
+    corners = np.array([[0, 0, 0], [40, 0, 0.4], [0, 40, 0.2], [40, 40, 0.0]])
+    axes = stellate.Mesh(corners, np.array([[0, 1, 2], [1, 2, 3]])).plot()
+    axes.figure.canvas.draw()
+    low, high = axes.get_zlim()
+    assert sum(low <= at <= high for at in axes.zaxis.get_ticklocs()) <= 2
+    low, high = axes.get_xlim()
+    assert sum(low <= at <= high for at in axes.xaxis.get_ticklocs()) >= 4
+    plt.close(axes.figure)

@@ -6,6 +6,7 @@ import meshio
 import numpy as np
 import pytest
 import stellate
+from scipy import spatial
 from stellate import oracles
 
 CORNERS = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1.0]])
@@ -65,3 +66,18 @@ def test_polygons_are_split(tmp_path):
     meshio.write_points_cells(tmp_path / "cube.obj", x, [("quad", np.array(squares))])
     cube = oracles.TriangleMesh(tmp_path / "cube.obj", spacing=0.1)
     assert np.abs(cube.closest_point([[0.5, 0.5, 1.05]]) - [0.5, 0.5, 1]).max() < 1e-6
+
+
+def test_creases_of_a_part_are_said_to_be_rounded():
+    """A cube has twelve, whichever way round its triangles are; an icosahedron bends by 42 degrees."""
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], dtype=float)
+    squares = [[0, 1, 3, 2], [4, 5, 7, 6], [0, 1, 5, 4], [2, 3, 7, 6], [0, 2, 6, 4], [1, 3, 7, 5]]
+    faces = np.array([[q[i] for i in part] for q in squares for part in ((0, 1, 2), (0, 3, 2))])
+    cube = oracles.TriangleMesh(corners, faces, spacing=0.1)
+    assert "where 12 edges bend by more than 60 degrees" in cube.about
+    golden = (1 + 5**0.5) / 2
+    ball = [
+        np.roll([0, a, b], turn) for turn in range(3) for a in (1, -1) for b in (golden, -golden)
+    ]
+    hull = spatial.ConvexHull(ball)
+    assert "edges" not in oracles.TriangleMesh(hull.points, hull.simplices, spacing=0.3).about

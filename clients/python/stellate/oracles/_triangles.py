@@ -18,6 +18,9 @@ from ._cloud import PointCloud
 _MOST_POINTS = 5_000_000
 # For meshio to begin on a busy machine, and to read: ten times what its slowest formats take.
 _SECONDS, _SECONDS_A_MB = 20, 20
+_SHARP = (
+    60.0  # degrees between neighbouring triangles, more than coarse ones of smooth surfaces have
+)
 _CAD = (".step", ".stp", ".iges", ".igs", ".brep")
 
 
@@ -64,6 +67,17 @@ class TriangleMesh(PointCloud):
             np.concatenate(samples)[np.sort(first)],
             2,
             bandwidth=3 * spacing if bandwidth is None else bandwidth,
+        )
+        self._sharp = _sharp_edges(points, triangles)
+
+    @property
+    def about(self) -> str:
+        """What it was fitted with, and the creases that are rounded, for the mesh's verdict."""
+        if not self._sharp:
+            return super().about
+        return (
+            f"{super().about}, where {self._sharp:,} edges bend by more than {_SHARP:g} degrees: creases, which are "
+            "rounded within the bandwidth, and no epsilon keeps them. A part is composed by solids in place of that"
         )
 
 
@@ -147,6 +161,21 @@ def _merged(points: Array, triangles: Any) -> tuple[Array, Any]:
         raise InvalidArgument(f"triangles have to name points from 0 to {len(points) - 1}")
     unique, names = np.unique(points, axis=0, return_inverse=True)
     return unique, names.reshape(-1)[triangles]
+
+
+def _sharp_edges(points: Array, triangles: Any) -> int:
+    """How many edges of a closed mesh have triangles that bend sharply there, whichever way round they are."""
+    a, b, c = (points[triangles[:, i]] for i in range(3))
+    normals = np.cross(b - a, c - a)
+    normals /= np.maximum(norms(normals), 1e-300)[:, None]
+    directed = triangles[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
+    ups = directed[:, 0] < directed[:, 1]
+    edges = np.sort(directed, axis=1)
+    order = np.lexsort((edges[:, 1], edges[:, 0]))
+    one, other = order[0::2], order[1::2]  # of each edge its two triangles
+    turned = np.where(ups[one] != ups[other], 1.0, -1.0)
+    cosines = turned * (normals[one // 3] * normals[other // 3]).sum(axis=1)
+    return int(np.count_nonzero(cosines < np.cos(np.radians(_SHARP))))
 
 
 def _insist_on_closed(points: Array, triangles: Any) -> None:
