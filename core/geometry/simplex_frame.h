@@ -86,6 +86,13 @@ inline constexpr double kDegenerateHeight = 1e-14;
   return std::sqrt(squared);
 }
 
+// The volume of a simplex whose frame is known, length^j.
+[[gnu::always_inline]] inline double FrameVolume(const SimplexFrame& frame, int j) {
+  double volume = 1;
+  for (int i = 0; i < j; ++i) volume *= frame.heights[i] / (i + 1);
+  return volume;
+}
+
 // MeasureSimplex of j + 1 vertices, j >= 2, whose frame is known.
 [[gnu::always_inline]] inline SimplexMeasures MeasureFramed(SimplexVertices vertices, int j, int d,
                                                             const SimplexFrame& frame) {
@@ -102,7 +109,7 @@ inline constexpr double kDegenerateHeight = 1e-14;
   }
   m.diameter = std::sqrt(longest2);
   m.shortest_edge = std::sqrt(shortest2);
-  for (int i = 0; i < j; ++i) m.volume *= frame.heights[i] / (i + 1);
+  m.volume = FrameVolume(frame, j);
   m.circumradius = FrameCircumradius(frame, j);
   return m;
 }

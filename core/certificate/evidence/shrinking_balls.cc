@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numbers>
 
+#include "core/base/vector_ops.h"
 #include "core/certificate/evidence/evidence.h"
 #include "core/certificate/evidence/probes.h"
 #include "core/certificate/findings.h"
@@ -61,20 +62,24 @@ void ShrinkingBalls::ShrinkToVertices(Ball* ball) {
   const double* const p = mesh_.Point(ball->vertex);
   const std::uint64_t step = std::max<std::uint64_t>(1, mesh_.vertices / kVerticesBesideBall);
   double narrowest = ball->radius, across = 0;
-  for (std::uint64_t v = 0; v < mesh_.vertices; v += step) {
-    const double* const q = mesh_.Point(static_cast<std::uint32_t>(v));
-    double along = 0, distance2 = 0;
-    for (int i = 0; i < mesh_.d; ++i) {
-      along += ball->normal[i] * (q[i] - p[i]);
-      distance2 += (q[i] - p[i]) * (q[i] - p[i]);
+  WithDimension(mesh_.d, [&](auto known) {
+    const int d = known() > 0 ? known() : mesh_.d;
+    for (std::uint64_t v = 0; v < mesh_.vertices; v += step) {
+      const double* const q = mesh_.points + v * static_cast<std::uint64_t>(d);
+      double along = 0, distance2 = 0;
+      for (int i = 0; i < d; ++i) {
+        const double away = q[i] - p[i];
+        along += ball->normal[i] * away;
+        distance2 += away * away;
+      }
+      if (!(along > 0)) continue;
+      const double radius = ReachBound(distance2, along);
+      // Vertices are farther apart than the oracle's error.
+      if (radius >= narrowest || !IsTelling(std::sqrt(distance2), along, edge, 0)) continue;
+      narrowest = radius;
+      across = std::sqrt(distance2);
     }
-    // Vertices are farther apart than the oracle's error.
-    if (!(along > 0) || !IsTelling(std::sqrt(distance2), along, edge, 0)) continue;
-    const double radius = ReachBound(distance2, along);
-    if (radius >= narrowest) continue;
-    narrowest = radius;
-    across = std::sqrt(distance2);
-  }
+  });
   if (across > 0) Touch(ball, narrowest, across);
 }
 
