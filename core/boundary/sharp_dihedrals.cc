@@ -41,19 +41,25 @@ bool HasSharpDihedral(const Stars<K>& stars, std::uint32_t p, const double* at,
       q[a] = ids[a + 1] < stars.size() ? stars.sample().Point(ids[a + 1]) : unborn;
     }
     double gram[3][3];
-    for (int a = 0; a < 3; ++a) gram[a][a] = SquaredDistance(at, q[a], d);
-    for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < a; ++b)
-        gram[a][b] = gram[b][a] = 0.5 * (gram[a][a] + gram[b][b] - SquaredDistance(q[a], q[b], d));
-    double inner[4][4] = {};  // of the gradients: p's, and the others'
-    for (int a = 0; a < 3; ++a)
-      for (int b = 0; b < 3; ++b) {
-        const int a1 = (a + 1) % 3, a2 = (a + 2) % 3, b1 = (b + 1) % 3, b2 = (b + 2) % 3;
-        const double minor = gram[a1][b1] * gram[a2][b2] - gram[a1][b2] * gram[a2][b1];
-        inner[a + 1][b + 1] = minor;
-        inner[0][b + 1] -= minor;
-        inner[0][0] += minor;
-      }
+    WithDimension(d, [&](auto known) {
+      const int n = known() > 0 ? known() : d;
+      for (int a = 0; a < 3; ++a) gram[a][a] = SquaredDistance(at, q[a], n);
+      for (int a = 0; a < 3; ++a)
+        for (int b = 0; b < a; ++b)
+          gram[a][b] = gram[b][a] =
+              0.5 * (gram[a][a] + gram[b][b] - SquaredDistance(q[a], q[b], n));
+    });
+    const auto minor = [&](int a1, int a2, int b1, int b2) {
+      return gram[a1][b1] * gram[a2][b2] - gram[a1][b2] * gram[a2][b1];
+    };
+    const double xx = minor(1, 2, 1, 2), xy = minor(1, 2, 2, 0), xz = minor(1, 2, 0, 1);
+    const double yy = minor(2, 0, 2, 0), yz = minor(2, 0, 0, 1), zz = minor(0, 1, 0, 1);
+    const double inner[4][4] = {
+        // of the gradients: p's, and the others'
+        {xx + xy + xz + xy + yy + yz + xz + yz + zz, -xx - xy - xz, -xy - yy - yz, -xz - yz - zz},
+        {0, xx, xy, xz},
+        {0, 0, yy, yz},
+        {0, 0, 0, zz}};
     for (int a = 0; a < 4; ++a)
       for (int b = a + 1; b < 4; ++b) {
         // Inside of the tetrahedron: that of the normals is its opposite.
