@@ -80,6 +80,29 @@ double CutByNear(double known, NearPoints* near, const Reach& reach, const Clip&
   }
 }
 
+// A point q in the tangent coordinates of p, T_p^t (q - p), and the half-space of its bisector.
+template <int K>
+struct Projected {
+  double normal[K];
+  double length2, offset;  // of q - p; of the half-space
+};
+
+template <int K>
+Projected<K> ProjectPoint(const Sample<K>& sample, const Site& p, double weight, std::uint32_t q,
+                          double* step) {
+  Projected<K> projected;
+  projected.length2 = sample.Project(p, sample.Point(q), step, projected.normal);
+  projected.offset = 0.5 * (projected.length2 + weight - sample.Weight(q));
+  return projected;
+}
+
+// Those of a thread's last cell in the tangent space, by place in the near points.
+template <int K>
+std::vector<Projected<K>>& ThreadProjected() {
+  thread_local std::vector<Projected<K>> projected;
+  return projected;
+}
+
 bool Contains(std::span<const std::uint32_t> ids, std::uint32_t id) {
   return std::find(ids.begin(), ids.end(), id) != ids.end();
 }
@@ -192,9 +215,10 @@ bool StarBuilder<K>::ClipApart(const Site& p, std::uint32_t q, double* step,
 
 // Judges a cell that was built in the tangent space. Returns whether it has the same vertices at
 // common centres: none of `near`, the points within reach, is nearer to a common centre than the
-// simplex's own.
+// simplex's own. So many of them are the thread's projected ones.
 template <int K>
-bool StarBuilder<K>::Judge(const Site& p, const NearPoints& near, Cell* star) const {
+bool StarBuilder<K>::Judge(const Site& p, const NearPoints& near, std::size_t projected,
+                           Cell* star) const {
   if constexpr (K == 2) {
     return false;
   } else {
@@ -202,7 +226,11 @@ bool StarBuilder<K>::Judge(const Site& p, const NearPoints& near, Cell* star) co
     if (near.empty()) return true;
     thread_local JudgedPlaces<K> places;
     places.Take(*star);
+    const std::span<const Projected<K>> known(ThreadProjected<K>().data(), projected);
     const double reach = Influence(p.id, *star), weight = sample_.Weight(p.id);
+    const auto project = [&](std::uint32_t q, double* step) {
+      return ProjectPoint<K>(sample_, p, weight, q, step);
+    };
     // Whether v is on q's own facet is left to rounding.
     const auto is_off = [&](std::size_t v, std::uint32_t q) {
       for (int s = 0; s < K; ++s)
@@ -210,16 +238,16 @@ bool StarBuilder<K>::Judge(const Site& p, const NearPoints& near, Cell* star) co
       return true;
     };
     Step step(sample_.d());
-    double normal[K];
-    for (const auto& [distance2, q] : near) {
-      if (distance2 > reach * reach) break;
-      const double length2 = sample_.Project(p, sample_.Point(q), step.data(), normal);
-      const double offset = 0.5 * (length2 + weight - sample_.Weight(q));
-      if (!places.Bound(normal, LengthOff(length2, Dot(normal, normal, K)), offset)) continue;
-      for (std::size_t v = 0; v < star->vertex_count(); ++v)
-        if (places.bound(v) > offset && is_off(v, q) &&
-            star->WouldCutVertex(v, normal, offset, step.data()))
-          return false;
+    for (std::size_t i = 0; i < near.size() && near[i].first <= reach * reach; ++i) {
+      const std::uint32_t q = near[i].second;
+      const Projected<K> to = i < known.size() ? known[i] : project(q, step.data());
+      if (!places.Bound(to.normal, LengthOff(to.length2, Dot(to.normal, to.normal, K)), to.offset))
+        continue;
+      for (std::size_t v = 0; v < star->vertex_count(); ++v) {
+        if (!(places.bound(v) > to.offset) || !is_off(v, q)) continue;
+        if (i < known.size()) project(q, step.data());  // for the step
+        if (star->WouldCutVertex(v, to.normal, to.offset, step.data())) return false;
+      }
     }
     return true;
   }
@@ -251,7 +279,7 @@ void StarBuilder<K>::CloseInTangentSpace(const Site& p, Cell* star) const {
         if (q != p.id) ClipInTangentSpace(p, sample_.At(q), &flat);
       });
   if (!flat.bounded()) return;
-  Judge(p, {}, &flat);
+  Judge(p, {}, 0, &flat);
   *star = flat;
 }
 
@@ -352,7 +380,7 @@ bool StarBuilder<K>::BuildAsInTangentSpace(const Site& p, std::span<const std::u
     const double reach = judged_reach();
     if (polytope.gave_up() || reach > farthest) return false;
     star->Take(polytope);
-    return Judge(p, around, star) && Influence(p.id, *star) <= reach;
+    return Judge(p, around, 0, star) && Influence(p.id, *star) <= reach;
   }
 }
 
@@ -407,23 +435,35 @@ void StarBuilder<K>::Build(const Site& p, std::span<const std::uint32_t> first, 
   BuildAsFound(p, first, star, influenced);
 }
 
-// Builds the cell in the tangent space. Afterwards `near` holds all points within `known`.
+// Builds the cell in the tangent space. Afterwards `near` holds all points within `known`. Returns
+// how many of them are the thread's projected ones.
 template <int K>
-void StarBuilder<K>::CutInTangentSpace(const Site& p, double* known, NearPoints* near,
-                                       const Search& search, Cell* star) const {
+std::size_t StarBuilder<K>::CutInTangentSpace(const Site& p, double* known, NearPoints* near,
+                                              const Search& search, Cell* star) const {
   if constexpr (K == 3) {
     DraftPolytope& polytope = ThreadPolytope();
+    std::vector<Projected<K>>& projected = ThreadProjected<K>();
+    projected.clear();
+    const double weight = sample_.Weight(p.id);
     Step step(sample_.d());
     polytope.Reset(options_.inradius);
     *known = CutByNear(
         *known, near, [&] { return Influence(p.id, polytope.max_norm2()); },
-        [&](std::uint32_t q) { return ClipApart(p, q, step.data(), &polytope); }, search);
-    if (!polytope.gave_up()) return star->Take(polytope);
+        [&](std::uint32_t q) {
+          projected.push_back(ProjectPoint<K>(sample_, p, weight, q, step.data()));
+          return polytope.Clip(q, projected.back().normal, projected.back().offset);
+        },
+        search);
+    if (!polytope.gave_up()) {
+      star->Take(polytope);
+      return projected.size();
+    }
   }
   ResetInTangentSpace(p, star);
   *known = CutByNear(
       *known, near, [&] { return Influence(p.id, *star); },
       [&](std::uint32_t q) { return ClipInTangentSpace(p, sample_.At(q), star); }, search);
+  return 0;
 }
 
 // Most stars are the same in the tangent space, where clips cost a fraction. Returns false if this
@@ -431,8 +471,8 @@ void StarBuilder<K>::CutInTangentSpace(const Site& p, double* known, NearPoints*
 template <int K>
 bool StarBuilder<K>::BuildInTangentSpace(const Site& p, double* known, NearPoints* near,
                                          const Search& search, Cell* star) const {
-  CutInTangentSpace(p, known, near, search, star);
-  return Judge(p, *near, star) && Influence(p.id, *star) <= *known;
+  const std::size_t projected = CutInTangentSpace(p, known, near, search, star);
+  return Judge(p, *near, projected, star) && Influence(p.id, *star) <= *known;
 }
 
 template <int K>

@@ -159,8 +159,8 @@ class StarBuilder {
                          Cell* star) const;
   bool BuildInTangentSpace(const Site& p, double* known, NearPoints* near, const Search& search,
                            Cell* star) const;
-  void CutInTangentSpace(const Site& p, double* known, NearPoints* near, const Search& search,
-                         Cell* star) const;
+  std::size_t CutInTangentSpace(const Site& p, double* known, NearPoints* near,
+                                const Search& search, Cell* star) const;
   template <typename Reach, typename ClipBy>
   void ClipAsFound(const Site& p, std::span<const std::uint32_t> first, const Reach& reach_now,
                    const ClipBy& clip, std::vector<std::uint32_t>* influenced) const;
@@ -172,7 +172,7 @@ class StarBuilder {
   bool ClipInTangentSpace(const Site& p, const Site& q, Cell* star) const;
   template <typename Polytope>
   bool ClipApart(const Site& p, std::uint32_t q, double* step, Polytope* polytope) const;
-  bool Judge(const Site& p, const NearPoints& near, Cell* star) const;
+  bool Judge(const Site& p, const NearPoints& near, std::size_t projected, Cell* star) const;
   static double MaxNorm2OnFaces(const Cell& star);
   static typename Cell::Scratch& ThreadScratch();
 

@@ -59,7 +59,7 @@ void RestrictedVoronoiCell<K>::Judge(const Surroundings<K>& around) {
     for (int s = 0; s < K; ++s) ids[s] = facets_[v.facet[s]].id;
     v.judged = around.Centre(ids, keys_[i], v.x, centre);
     if (v.judged)
-      v.norm2 = Dot(centre, centre, static_cast<int>(d_));
+      DotRows(centre, 1, centre, static_cast<int>(d_), &v.norm2);
     else
       around.Lift(v.x, centre);
   }
