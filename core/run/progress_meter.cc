@@ -65,10 +65,14 @@ void ProgressMeter::Cover(const Stars<K>& stars) {
   const auto d = static_cast<std::size_t>(stars.sample().d());
   const std::size_t count = open_.size() / d;
   std::vector<std::uint8_t> covered(count, 0);
+  const double* const points = stars.sample().points().data();
   ParallelFor(count, [&](std::size_t i) {
-    for (std::uint32_t v = looked_at_; v < stars.size() && !covered[i]; ++v)
-      covered[i] = SquaredDistance(open_.data() + i * d, stars.sample().Point(v),
-                                   stars.sample().d()) <= epsilon_ * epsilon_;
+    WithDimension(stars.sample().d(), [&](auto known) {
+      const int n = known() > 0 ? known() : stars.sample().d();
+      const double* const y = open_.data() + i * d;
+      for (std::uint32_t v = looked_at_; v < stars.size() && !covered[i]; ++v)
+        covered[i] = SquaredDistance(y, points + v * d, n) <= epsilon_ * epsilon_;
+    });
   });
   looked_at_ = stars.size();
   std::vector<double> left;

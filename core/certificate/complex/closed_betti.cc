@@ -4,6 +4,7 @@
 #include <array>
 #include <cstddef>
 #include <map>
+#include <numeric>
 #include <utility>
 
 #include "core/base/interruption.h"
@@ -57,8 +58,9 @@ std::vector<Triangle> CollapseTetrahedra(const Adjacency& adjacency, std::int64_
 // A complex of triangles and their edges, from which triangles collapse through edges in no other.
 class Spine {
  public:
-  explicit Spine(const std::vector<Triangle>& triangles) {
-    NumberEdges(triangles);
+  // `vertices`: more than any id.
+  Spine(const std::vector<Triangle>& triangles, std::size_t vertices) {
+    NumberEdges(triangles, vertices);
     ListSides();
     Collapse();
   }
@@ -98,30 +100,36 @@ class Spine {
   }
 
  private:
-  void NumberEdges(const std::vector<Triangle>& triangles) {
+  void NumberEdges(const std::vector<Triangle>& triangles, std::size_t vertices) {
+    // By the low end, then by the other, and then by triangle.
     struct Side {
-      std::uint64_t edge;
-      std::uint32_t triangle;
-    };
-    std::vector<Side> sides;
-    sides.reserve(3 * triangles.size());
-    for (std::uint32_t t = 0; t < triangles.size(); ++t)
-      for (std::size_t i = 0; i < 3; ++i) {
-        const std::uint64_t low = triangles[t][i == 0], high = triangles[t][i == 2 ? 1 : 2];
-        sides.push_back({low << 32 | high, t});
+      std::uint32_t high, triangle;
+      bool operator<(const Side& other) const {
+        return std::pair(high, triangle) < std::pair(other.high, other.triangle);
       }
-    std::sort(sides.begin(), sides.end(), [](const Side& a, const Side& b) {
-      return std::pair(a.edge, a.triangle) < std::pair(b.edge, b.triangle);
-    });
+    };
+    const auto for_each_side = [&](const auto& visit) {
+      for (std::uint32_t t = 0; t < triangles.size(); ++t)
+        for (std::size_t i = 0; i < 3; ++i)
+          visit(triangles[t][i == 0], Side{triangles[t][i == 2 ? 1 : 2], t});
+    };
+    std::vector<std::size_t> next(vertices + 1);  // by low end; where its next side goes
+    for_each_side([&](std::uint32_t low, const Side&) { ++next[low + 1]; });
+    std::partial_sum(next.begin(), next.end(), next.begin());
+    std::vector<Side> sides(3 * triangles.size());
+    for_each_side([&](std::uint32_t low, const Side& side) { sides[next[low]++] = side; });
     triangles_.resize(triangles.size());
+    at_.reserve(sides.size());
     std::vector<std::uint8_t> count(triangles.size());
-    for (std::size_t i = 0; i < sides.size(); ++i) {
-      CheckInterruption(i);
-      if (i > 0 && sides[i].edge != sides[i - 1].edge) begin_.push_back(at_.size());
-      if (i == 0) begin_.push_back(0);
-      const std::uint32_t t = sides[i].triangle;
-      triangles_[t][count[t]++] = static_cast<std::uint32_t>(begin_.size() - 1);
-      at_.push_back(t);
+    for (std::size_t v = 0, begin = 0; v < vertices; begin = next[v++]) {
+      CheckInterruption(v);
+      std::sort(sides.data() + begin, sides.data() + next[v]);
+      for (std::size_t i = begin; i < next[v]; ++i) {
+        if (i == begin || sides[i].high != sides[i - 1].high) begin_.push_back(at_.size());
+        const std::uint32_t t = sides[i].triangle;
+        triangles_[t][count[t]++] = static_cast<std::uint32_t>(begin_.size() - 1);
+        at_.push_back(t);
+      }
     }
     begin_.push_back(at_.size());
   }
@@ -172,7 +180,7 @@ class Spine {
 
 std::int64_t FirstBetti(const SimplexList& list, std::int64_t components) {
   std::int64_t vertices = 0;
-  const Spine spine(CollapseTetrahedra(Adjacency(list), &vertices));
+  const Spine spine(CollapseTetrahedra(Adjacency(list), &vertices), list.vertices);
   return spine.edges() - vertices + components - spine.BoundaryRank();
 }
 

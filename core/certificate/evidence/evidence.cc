@@ -55,12 +55,17 @@ class Comparison {
       }
       if (squared > kLook * kLook * size * size) return;
       const double* p = mesh_.Point(v);
-      for (int i = 0; i < d; ++i) step[static_cast<std::size_t>(i)] = y[i] - p[i];
-      double along2 = 0;
-      for (int a = 0; a < mesh_.k; ++a) {
-        const double along = Dot(mesh_.Tangent(v) + a * d, step.data(), d);
-        along2 += along * along;
-      }
+      const double* const tangent = mesh_.Tangent(v);
+      const double along2 = WithDimension(d, [&](auto known) {
+        const int n = known() > 0 ? known() : d;
+        for (int i = 0; i < n; ++i) step[static_cast<std::size_t>(i)] = y[i] - p[i];
+        double sum = 0;
+        for (int a = 0; a < mesh_.k; ++a) {
+          const double along = Dot(tangent + a * n, step.data(), n);
+          sum += along * along;
+        }
+        return sum;
+      });
       const double away2 = squared - along2, bound = 2 * kLook * size;
       // The bound |y - p|^2 / (2 away) is mostly larger than any that counts.
       if (!(away2 * bound * bound > squared * squared)) return;
