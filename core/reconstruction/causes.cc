@@ -9,6 +9,7 @@
 #include "core/base/parallel.h"
 #include "core/base/vector_ops.h"
 #include "core/index/indexed_points.h"
+#include "core/reconstruction.h"
 
 namespace stellate::core {
 namespace {
@@ -62,13 +63,12 @@ double Turn2(const FittedCloud& cloud, std::uint32_t p, std::uint32_t q) {
 // Whether it is above a bound. The sum of all squared sines, which is soon computed, decides most
 // often.
 bool TurnsBy(double sine2, const FittedCloud& cloud, std::uint32_t p, std::uint32_t q) {
-  double sum = cloud.k;
-  for (int a = 0; a < cloud.k; ++a)
-    for (int b = 0; b < cloud.k; ++b) {
-      const double cosine =
-          Dot(cloud.Tangent(p) + a * cloud.d, cloud.Tangent(q) + b * cloud.d, cloud.d);
-      sum -= cosine * cosine;
-    }
+  double sum = cloud.k, cosines[kMaxReconstructionDimension];
+  const auto k = static_cast<std::size_t>(cloud.k);
+  for (int a = 0; a < cloud.k; ++a) {
+    DotRows(cloud.Tangent(q), k, cloud.Tangent(p) + a * cloud.d, cloud.d, cosines);
+    for (std::size_t b = 0; b < k; ++b) sum -= cosines[b] * cosines[b];
+  }
   if (!(sum > sine2) || cloud.k == 1) return sum > sine2;
   return Turn2(cloud, p, q) > sine2;
 }

@@ -7,7 +7,7 @@
 
 #include "core/base/parallel.h"
 #include "core/base/power.h"
-#include "core/index/indexed_points.h"
+#include "core/reconstruction/neighbour_search.h"
 #include "core/reconstruction/quadric_fit.h"
 #include "core/specification.h"
 
@@ -42,38 +42,6 @@ double MedianOf(std::vector<double>* values) {
   std::nth_element(values->begin(), middle, values->end());
   return *middle;
 }
-
-// Neighbours of all points, and the points in an order in which each is mostly near the last.
-class NeighbourSearch {
- public:
-  NeighbourSearch(const std::vector<double>& points, int d) : points_(d) {
-    for (std::size_t at = 0; at < points.size(); at += static_cast<std::size_t>(d))
-      points_.AddUnindexed(points.data() + at);
-    points_.Index(BallTree::Halving::kExtent);
-    for (const BallTree::Bunch& bunch : points_.tree().Bunches())
-      order_.insert(order_.end(), bunch.ids, bunch.ids + bunch.count);
-  }
-
-  // Calls visit(p, neighbours) for each point, in parallel. The neighbours begin with p itself.
-  template <typename Start, typename Visit>
-  void ForEach(int count, const Start& start, const Visit& visit) const {
-    ParallelChunks(order_.size(), [&](std::size_t, std::size_t begin, std::size_t end) {
-      std::vector<std::pair<double, std::uint32_t>> near(static_cast<std::size_t>(count));
-      auto memory = start();
-      for (std::size_t i = begin; i < end; ++i) {
-        const std::uint32_t p = order_[i];
-        const int found = FindNearest(points_.tree(), points_.Point(p), count, near.data());
-        visit(p, Neighbours(near.data(), static_cast<std::size_t>(found)), memory);
-      }
-    });
-  }
-
-  const std::vector<double>& points() const { return points_.coordinates(); }
-
- private:
-  IndexedPoints points_;
-  std::vector<std::uint32_t> order_;
-};
 
 class CloudFitter {
  public:
@@ -133,7 +101,8 @@ class CloudFitter {
         [&](std::uint32_t p, Neighbours near, QuadricFit& fit) {
           const bool given = !request_.tangents.empty();
           fit.Fit(search.points().data(), near,
-                  given ? request_.tangents.data() + p * numbers() : nullptr);
+                  given ? request_.tangents.data() + p * numbers() : nullptr,
+                  QuadricFit::Wanted::kDeviation);
           cloud_.nearest[p] = std::sqrt(near[1].first);
           cloud_.spacing[p] = SpacingOf(near);
           for (std::size_t i = 0; i < near.size(); ++i)
@@ -192,7 +161,7 @@ class CloudFitter {
       kurtosis[p] = fit.kurtosis();
       height[p] = fit.step().norm();
     };
-    std::vector<double> moved = Smooth(cloud_.positions, note);
+    std::vector<double> moved = Smooth(cloud_.positions, QuadricFit::Wanted::kAll, note);
     cloud_.misfits = !request_.noise && IsMisfit(noise);
     if (cloud_.misfits) {
       std::fill(cloud_.smoothed.begin(), cloud_.smoothed.end(), std::uint8_t{0});
@@ -219,22 +188,24 @@ class CloudFitter {
   }
 
   void SmoothAgain(const std::vector<double>& moved) {
-    cloud_.positions = Smooth(moved, [&](std::uint32_t p, Neighbours, const QuadricFit& fit) {
+    const auto take = [&](std::uint32_t p, Neighbours, const QuadricFit& fit) {
       std::copy(fit.tangent().begin(), fit.tangent().end(), cloud_.tangents.data() + p * numbers());
-    });
+    };
+    cloud_.positions = Smooth(moved, QuadricFit::Wanted::kQuadric, take);
   }
 
   // Returns copies of `points`, the marked ones moved to quadrics. Calls visit(p, neighbours, fit)
   // for each of these.
   template <typename Visit>
-  std::vector<double> Smooth(const std::vector<double>& points, const Visit& visit) const {
+  std::vector<double> Smooth(const std::vector<double>& points, QuadricFit::Wanted wanted,
+                             const Visit& visit) const {
     const NeighbourSearch search(points, cloud_.d);
     std::vector<double> moved = points;
     search.ForEach(
         Count(SmoothedOver(cloud_.k)), [&] { return NewFit(); },
         [&](std::uint32_t p, Neighbours near, QuadricFit& fit) {
           if (!cloud_.smoothed[p]) return;
-          fit.Fit(search.points().data(), near, nullptr);
+          fit.Fit(search.points().data(), near, nullptr, wanted);
           double* const copy = moved.data() + std::size_t{p} * static_cast<std::size_t>(cloud_.d);
           for (int i = 0; i < cloud_.d; ++i) copy[i] += fit.step()[i];
           visit(p, near, fit);

@@ -86,10 +86,10 @@ void QuadricFit::Weigh(const double* points, Neighbours neighbours) {
 void QuadricFit::FindPlane() {
   const Eigen::Index m = offsets_.cols();
   const Eigen::VectorXd mean = offsets_ * weights_ / weights_.sum();
-  const Eigen::MatrixXd scaled = (offsets_.colwise() - mean) * weights_.cwiseSqrt().asDiagonal();
+  scaled_.noalias() = (offsets_.colwise() - mean) * weights_.cwiseSqrt().asDiagonal();
   const bool by_points = d_ > m;
-  const Leading eigen = EigenOf(by_points ? Eigen::MatrixXd(scaled.transpose() * scaled)
-                                          : Eigen::MatrixXd(scaled * scaled.transpose()));
+  const Leading eigen = EigenOf(by_points ? Eigen::MatrixXd(scaled_.transpose() * scaled_)
+                                          : Eigen::MatrixXd(scaled_ * scaled_.transpose()));
   const Eigen::Index count = eigen.values.size();
   for (int a = 0; a < k_; ++a) {
     const Eigen::Index at = count - 1 - a;
@@ -97,7 +97,7 @@ void QuadricFit::FindPlane() {
     if (at < 0)
       row.setZero();
     else if (by_points)
-      row = scaled * eigen.vectors.col(at);
+      row = scaled_ * eigen.vectors.col(at);
     else
       row = eigen.vectors.col(at);
   }
@@ -107,57 +107,63 @@ void QuadricFit::FindPlane() {
     extent_ += eigen.values[i] >= kExtends * eigen.values[count - 1];
 }
 
-void QuadricFit::FitHeights(bool keep) {
+void QuadricFit::FitHeights(bool keep, Wanted wanted) {
   const Eigen::Index m = offsets_.cols();
   const bool quadric = m > Terms(k_);
   const Eigen::Index count = quadric ? Terms(k_) : m > k_ + 1 ? k_ + 1 : 1;
   const Eigen::Map<const Eigen::MatrixXd> tangent(tangent_.data(), d_, k_);
   const double scale = 1 / std::sqrt(radius2_);
-  const Eigen::MatrixXd along = tangent.transpose() * offsets_;  // k x m
-  const Eigen::MatrixXd heights = offsets_ - tangent * along;    // d x m
+  along_.noalias() = tangent.transpose() * offsets_;
+  heights_.noalias() = offsets_ - tangent * along_;
   terms_.resize(count, m);
   for (Eigen::Index j = 0; j < m; ++j) {
     Eigen::Index row = 0;
     terms_(row++, j) = 1;
-    for (int a = 0; a < k_ && row < count; ++a) terms_(row++, j) = scale * along(a, j);
+    for (int a = 0; a < k_ && row < count; ++a) terms_(row++, j) = scale * along_(a, j);
     for (int a = 0; a < k_ && row < count; ++a)
-      for (int b = a; b < k_; ++b) terms_(row++, j) = scale * scale * along(a, j) * along(b, j);
+      for (int b = a; b < k_; ++b) terms_(row++, j) = scale * scale * along_(a, j) * along_(b, j);
   }
-  const Eigen::MatrixXd weighted = terms_ * weights_.asDiagonal();
-  Eigen::MatrixXd normal = weighted * terms_.transpose();
-  normal.diagonal().array() += kRidge * weights_.sum();
-  const Eigen::MatrixXd coefficients =
-      normal.llt().solve(weighted * heights.transpose());  // count x d
-  step_ = coefficients.row(0).transpose();
+  weighted_.noalias() = terms_ * weights_.asDiagonal();
+  normal_.noalias() = weighted_ * terms_.transpose();
+  normal_.diagonal().array() += kRidge * weights_.sum();
+  coefficients_.noalias() = weighted_ * heights_.transpose();
+  normal_.llt().solveInPlace(coefficients_);
+  step_ = coefficients_.row(0).transpose();
   if (!keep && count > k_) {
     Eigen::Map<Eigen::MatrixXd>(tangent_.data(), d_, k_) +=
-        scale * coefficients.middleRows(1, k_).transpose();
+        scale * coefficients_.middleRows(1, k_).transpose();
     Orthonormalize(k_, d_, tangent_.data());
   }
-  const Eigen::MatrixXd residuals = heights - coefficients.transpose() * terms_;
-  const double freedom = static_cast<double>(m - count) / static_cast<double>(m);
-  const double sum = residuals.colwise().squaredNorm() * weights_;
-  deviation_ = freedom > 0 ? std::sqrt(sum / (weights_.sum() * freedom * (d_ - k_))) : 0;
-  MeasureKurtosis(residuals);
+  if (wanted != Wanted::kQuadric) Deviate(wanted);
 }
 
-void QuadricFit::MeasureKurtosis(const Eigen::MatrixXd& residuals) {
+void QuadricFit::Deviate(Wanted wanted) {
+  const Eigen::Index m = terms_.cols(), count = terms_.rows();
+  residuals_.noalias() = heights_ - coefficients_.transpose() * terms_;
+  const double freedom = static_cast<double>(m - count) / static_cast<double>(m);
+  const double sum = residuals_.colwise().squaredNorm() * weights_;
+  deviation_ = freedom > 0 ? std::sqrt(sum / (weights_.sum() * freedom * (d_ - k_))) : 0;
+  if (wanted == Wanted::kAll) MeasureKurtosis();
+}
+
+void QuadricFit::MeasureKurtosis() {
   Eigen::Index longest = 0;
-  residuals.colwise().squaredNorm().maxCoeff(&longest);
-  Eigen::VectorXd direction = residuals.col(longest);
+  residuals_.colwise().squaredNorm().maxCoeff(&longest);
+  Eigen::VectorXd direction = residuals_.col(longest);
   constexpr int kSteps = 5;  // of the power method; one finds all of it in codimension 1
   for (int step = d_ - k_ > 1 ? kSteps : 0; step > 0; --step) {
-    direction = residuals * (residuals.transpose() * direction);
+    direction = residuals_ * (residuals_.transpose() * direction);
     const double length = direction.norm();
     if (!(length > 0)) break;
     direction /= length;
   }
-  const Eigen::ArrayXd square = (residuals.transpose() * direction).array().square();
+  const Eigen::ArrayXd square = (residuals_.transpose() * direction).array().square();
   const double second = square.mean();
   kurtosis_ = second > 0 ? square.square().mean() / (second * second) : 0;
 }
 
-void QuadricFit::Fit(const double* points, Neighbours neighbours, const double* given) {
+void QuadricFit::Fit(const double* points, Neighbours neighbours, const double* given,
+                     Wanted wanted) {
   const auto numbers = static_cast<std::size_t>(k_) * static_cast<std::size_t>(d_);
   Weigh(points, neighbours);
   tangent_.resize(numbers);
@@ -166,7 +172,7 @@ void QuadricFit::Fit(const double* points, Neighbours neighbours, const double* 
     std::copy_n(given, numbers, tangent_.data());
   else
     FindPlane();
-  FitHeights(given != nullptr);
+  FitHeights(given != nullptr, wanted);
 }
 
 }  // namespace stellate::core

@@ -16,7 +16,7 @@ using Neighbours = std::span<const std::pair<double, std::uint32_t>>;
 // squares. Weights fall off like a Gaussian. Keep one for many points: it reuses its memory.
 //
 //   QuadricFit fit(k, d);
-//   fit.Fit(points, neighbours, nullptr);
+//   fit.Fit(points, neighbours, nullptr, QuadricFit::Wanted::kQuadric);
 //   fit.tangent();  // k rows of d, orthonormal
 //
 // The sums are in the order of the neighbours, so that equal neighbours give equal bits.
@@ -24,12 +24,18 @@ class QuadricFit {
  public:
   QuadricFit(int k, int d) : k_(k), d_(d) {}
 
+  // What a fit is made for: the tangent space and the step; the deviation and the extent, too; and
+  // all.
+  enum class Wanted { kQuadric, kDeviation, kAll };
+
   // The coefficients of the polynomial: 1 + k + k (k + 1) / 2.
   static constexpr int Terms(int k) { return 1 + k + k * (k + 1) / 2; }
 
   // `points`: d each, by id. `given`: the tangent space at p, k rows of d, which then stays as it
-  // is; null: it is fitted. With too few neighbours for a quadric, fits a plane.
-  void Fit(const double* points, Neighbours neighbours, const double* given);
+  // is; null: it is fitted. With too few neighbours for a quadric, fits a plane. What is not wanted
+  // keeps no meaning.
+  void Fit(const double* points, Neighbours neighbours, const double* given,
+           Wanted wanted = Wanted::kAll);
 
   // The tangent space at p.
   const std::vector<double>& tangent() const { return tangent_; }
@@ -47,14 +53,21 @@ class QuadricFit {
  private:
   void Weigh(const double* points, Neighbours neighbours);
   void FindPlane();
-  void FitHeights(bool keep);
-  void MeasureKurtosis(const Eigen::MatrixXd& residuals);
+  void FitHeights(bool keep, Wanted wanted);
+  void Deviate(Wanted wanted);
+  void MeasureKurtosis();
 
   int k_, d_;
-  double radius2_ = 0;       // the scale of weights and coordinates, squared
-  Eigen::MatrixXd offsets_;  // d x m, from p
-  Eigen::VectorXd weights_;  // m
-  Eigen::MatrixXd terms_;    // terms x m
+  double radius2_ = 0;                // the scale of weights and coordinates, squared
+  Eigen::MatrixXd offsets_;           // d x m, from p
+  Eigen::VectorXd weights_;           // m
+  Eigen::MatrixXd scaled_;            // d x m, offsets from the mean by the roots of the weights
+  Eigen::MatrixXd along_;             // k x m, offsets along the plane
+  Eigen::MatrixXd heights_;           // d x m, over it
+  Eigen::MatrixXd terms_, weighted_;  // terms x m
+  Eigen::MatrixXd normal_;            // terms x terms
+  Eigen::MatrixXd coefficients_;      // terms x d
+  Eigen::MatrixXd residuals_;         // d x m
   std::vector<double> tangent_;
   Eigen::VectorXd step_;
   double deviation_ = 0, kurtosis_ = 0;

@@ -7,6 +7,7 @@
 #include "core/base/dense.h"
 #include "core/base/parallel.h"
 #include "core/base/random.h"
+#include "core/base/vector_ops.h"
 #include "core/geometry/restricted_voronoi_cell.h"
 #include "core/geometry/surroundings.h"
 
@@ -19,6 +20,8 @@ constexpr double kOmega = 0.5;
 constexpr double kCellInradius = 6;
 constexpr std::size_t kMostNear = 2000;
 constexpr double kReachError = 1 + 1e-7;
+// Far above rounding, as a share of squared lengths: what cuts so nearly is tried.
+constexpr double kUncertain = 1e-9;
 // cos^2 of 65 degrees: what tilts by more against the tangent space at a vertex is a sliver.
 constexpr double kUpright2 = 0.1786;
 
@@ -188,8 +191,10 @@ void WeightedStars<K>::Build(std::uint32_t p) {
   star.built = true;
   star.simplices.clear();
   star.keys.clear();
+  star.corners.clear();
   star.most2 = m.cell.max_norm2();
   for (std::size_t v = 0; v < m.cell.vertex_count(); ++v) {
+    std::copy_n(m.cell.x(v), K, star.corners.emplace_back().begin());
     Simplex s;
     s[0] = p;
     bool real = true;
@@ -203,6 +208,24 @@ void WeightedStars<K>::Build(std::uint32_t p) {
     star.simplices.push_back(s);
     star.keys.push_back(KeyOf(s));
   }
+}
+
+// It cuts most with its largest weight.
+template <int K>
+bool WeightedStars<K>::MayMeet(std::uint32_t q, const Choice& choice) {
+  const Star& star = stars_[q];
+  std::array<double, K> normal;
+  const double distance2 = SquaredDistance(points_.Point(q), points_.Point(choice.point), cloud_.d);
+  const double offset =
+      Bisector(q, choice.point, distance2, normal.data()) - choice.g * choice.upper;
+  const double certain = offset - kUncertain * (distance2 + std::abs(offset));
+  for (const auto& corner : star.corners)
+    if (!(Dot(normal.data(), corner.data(), K) < certain)) return true;
+  // What is known of the points near q is as much as if its star had been built for all.
+  const double height = std::max(std::abs(choice.lower), std::abs(choice.upper));
+  const double reach2 = Influence2(star.most2 + height * height);
+  while (!(near_[q].back().first > reach2) && !HasAllNear(q)) MoreNear(q, 2 * near_[q].size());
+  return false;
 }
 
 template <int K>

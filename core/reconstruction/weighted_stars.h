@@ -24,7 +24,8 @@ class WeightedStars {
     bool built = false;
     std::vector<Simplex> simplices;
     std::vector<std::uint64_t> keys;
-    double most2 = 0;  // its largest circumradius, squared
+    std::vector<std::array<double, K>> corners;  // of its cell, in the tangent space
+    double most2 = 0;                            // its largest circumradius, squared
   };
   // A simplex that a star has while y is between two values.
   struct Span {
@@ -63,6 +64,10 @@ class WeightedStars {
   void Build(std::uint32_t p);
   void BuildAll();
 
+  // Whether a point, q aside, may be in the star of q for some weight that it may get. If not, as
+  // of most that are near, BuildForAll would find nothing. REQUIRES: StarOf(q) was called since the
+  // last weight changed that matters to it.
+  bool MayMeet(std::uint32_t q, const Choice& choice);
   // Adds the simplices of the star of q for all weights that a point may get. Returns whether it is
   // in that star.
   bool BuildForAll(std::uint32_t q, const Choice& choice, std::vector<Span>* spans);

@@ -222,7 +222,7 @@ class WeightSearch {
       const auto [distance2, q] = near[i];
       const double most2 = stars_.StarOf(q).most2;
       const double reach = 1.05 * (std::sqrt(most2) + std::sqrt(most2 + most));
-      if (distance2 > reach * reach) return;
+      if (distance2 > reach * reach || !stars_.MayMeet(q, choice)) return;
       parts[i].meets = stars_.BuildForAll(q, choice, &parts[i].spans);
     });
     std::vector<std::uint32_t> around{p};
