@@ -15,9 +15,16 @@ using core::Message;
 constexpr std::uint64_t kStarBytes[] = {0, 420, 330, 4300, 25'000, 150'000};
 static_assert(std::size(kStarBytes) == core::kMaxDimension + 1);
 constexpr std::uint64_t kEmptyMeshBytes = std::uint64_t{1} << 16;  // one with nothing in it
-constexpr std::uint64_t kReconstructedBytes = 500;  // of a point, beside it and its tangent basis
-// Besides, where weights are sought of all points: neighbours, stars, slivers.
-constexpr std::uint64_t kWeighedBytes = 4000;
+// Of a point of a cloud, beside it and its tangent basis, by k: its star and its neighbours; and of
+// each coordinate for k = 3: the centres of some 27 tetrahedra.
+constexpr std::uint64_t kReconstructedBytes[] = {0, 450, 450, 3850};
+static_assert(std::size(kReconstructedBytes) == core::kMaxReconstructionDimension + 1);
+constexpr std::uint64_t kCentreBytes = 180;
+// The cloud's, the stars' and the result's points and tangent bases.
+constexpr std::uint64_t kCopies = 3;
+// Besides, for k <= 2, where weights are sought of all points. For k = 3 they are sought before the
+// stars are built, which take more.
+constexpr std::uint64_t kWeighedBytes = 800;
 constexpr std::uint64_t kFinishedBytes = std::uint64_t{1} << 14;  // without history and seeds
 constexpr std::uint64_t kCallBytes = std::uint64_t{1} << 15;      // that sends nothing
 constexpr std::uint64_t kLeastOfStreams = std::uint64_t{4} << 20;
@@ -49,11 +56,11 @@ std::uint64_t EstimateReconstructionBytes(const core::ReconstructionSpecificatio
                                           std::uint64_t points) {
   const auto d = static_cast<std::uint64_t>(spec.ambient_dimension);
   const auto k = static_cast<std::uint64_t>(spec.dimension);
-  const bool weighs = spec.weights == core::Weighting::kOnly || (k == 3 && spec.reach);
-  const std::uint64_t weighed = weighs ? kWeighedBytes : 0;
+  const bool weighs = spec.weights == core::Weighting::kOnly && k <= 2;
+  const std::uint64_t star = kReconstructedBytes[k] + (k == 3 ? kCentreBytes * d : 0);
   const std::uint64_t vertices = points + core::MostAdded(spec, points);
   return kEmptyMeshBytes +
-         vertices * (sizeof(double) * d * (k + 1) + kReconstructedBytes + weighed);
+         vertices * (kCopies * sizeof(double) * d * (k + 1) + star + (weighs ? kWeighedBytes : 0));
 }
 
 std::uint64_t EstimateFinishedBytes(const core::Specification& spec) {

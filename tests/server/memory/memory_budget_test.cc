@@ -112,6 +112,31 @@ TEST(MemoryBudget, EstimatesAreWhatWasMeasured) {
   }
 }
 
+// The peak beside the points that came, of uniform samples of 15,000 to 1,000,000 points.
+TEST(MemoryBudget, EstimatesOfReconstructionsCoverWhatWasMeasured) {
+  struct Measured {
+    int k, d;
+    core::Weighting weights;
+    double bytes;
+  };
+  constexpr auto kAuto = core::Weighting::kAuto, kOnly = core::Weighting::kOnly;
+  for (const auto& [k, d, weights, bytes] :
+       {Measured{1, 3, kAuto, 523}, Measured{1, 3, kOnly, 639}, Measured{2, 3, kAuto, 648},
+        Measured{2, 4, kAuto, 613}, Measured{2, 3, kOnly, 1272}, Measured{2, 1000, kAuto, 71'812},
+        Measured{3, 4, kAuto, 4879}, Measured{3, 6, kAuto, 5399}, Measured{3, 9, kAuto, 6250},
+        Measured{3, 9, kOnly, 5561}}) {
+    core::ReconstructionSpecification spec;
+    spec.dimension = k;
+    spec.ambient_dimension = d;
+    spec.weights = weights;
+    constexpr std::uint64_t kPoints = 1'000'000;
+    const double estimate =
+        static_cast<double>(EstimateReconstructionBytes(spec, kPoints)) / double{kPoints};
+    EXPECT_GE(estimate, bytes) << core::Message(k, " in R^", d);
+    EXPECT_LE(estimate, 2.5 * bytes) << core::Message(k, " in R^", d);
+  }
+}
+
 TEST(MemoryBudget, SeedsAreCountedEvenOfWhatIsFinished) {
   core::Specification spec = testing::SphereSpec(0.1);
   const std::uint64_t few = EstimateFinishedBytes(spec);
